@@ -1,0 +1,3 @@
+//! The `meshloom` command: see [`meshloom`] for the library.
+
+fn main() {}
