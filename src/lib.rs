@@ -22,6 +22,22 @@
 
 pub mod diag;
 pub mod task;
+pub mod world;
 
+pub mod edit;
+pub mod loom;
+pub mod math;
 pub mod mesh;
+pub mod metric;
+pub mod sample;
+pub mod signal;
 pub mod space;
+
+pub mod demo;
+pub mod format;
+pub mod plot;
+pub mod view;
+
+pub mod cli;
+pub mod io;
+pub mod pipeline;

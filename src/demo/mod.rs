@@ -1,0 +1,1 @@
+//! Built-in captures, generated: the same bytes on every run.

@@ -1,0 +1,1 @@
+//! What can be done to a loom: one verb a file, each pure.

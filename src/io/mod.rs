@@ -1,0 +1,1 @@
+//! The disk: [`crate::world::World`] on std::fs, whole files by rename.

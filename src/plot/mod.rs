@@ -1,0 +1,1 @@
+//! Series to pictures with tiny-skia, or to SVG. Pure.

@@ -1,0 +1,1 @@
+//! Which times, and the frames of a loom at them.

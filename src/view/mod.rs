@@ -1,0 +1,1 @@
+//! A mesh and a camera to pixels, on the CPU. Pure.
