@@ -53,6 +53,9 @@ pub struct Diagnostic {
     pub place: Place,
     /// What is wrong.
     pub message: String,
+    /// The line of text that the place names, where a person would want to see it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub excerpt: Option<String>,
     /// What could be done about it.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub hints: Vec<String>,
@@ -77,6 +80,7 @@ impl Diagnostic {
             severity,
             place: Place::default(),
             message: message.into(),
+            excerpt: None,
             hints: Vec::new(),
         }
     }
@@ -123,6 +127,13 @@ impl Diagnostic {
         self
     }
 
+    /// Shows the line that the place names; a caret is set under its column.
+    #[must_use]
+    pub fn excerpt(mut self, line: impl Into<String>) -> Self {
+        self.excerpt = Some(line.into());
+        self
+    }
+
     /// Adds a hint.
     #[must_use]
     pub fn hint(mut self, hint: impl Into<String>) -> Self {
@@ -166,7 +177,7 @@ impl fmt::Display for Place {
     }
 }
 
-/// `error: place: message` and a line `  hint: ..` for each hint.
+/// `error: place: message`, the line with a caret where one is shown, and `  hint: ..` for each hint.
 impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.severity {
@@ -178,6 +189,18 @@ impl fmt::Display for Diagnostic {
             write!(f, "{}: ", self.place)?;
         }
         f.write_str(&self.message)?;
+        if let Some(line) = &self.excerpt {
+            write!(f, "\n  | {line}")?;
+            if let Some(column) = self.place.column {
+                // Tabs stay tabs, so that the caret stands under its letter at any tab width.
+                let indent: String = line
+                    .chars()
+                    .take(column.saturating_sub(1))
+                    .map(|c| if c == '\t' { c } else { ' ' })
+                    .collect();
+                write!(f, "\n  | {indent}^")?;
+            }
+        }
         self.hints
             .iter()
             .try_for_each(|hint| write!(f, "\n  hint: {hint}"))
@@ -232,6 +255,19 @@ mod tests {
         assert_eq!(
             error.to_string(),
             "error: a.obj:12: face index 9 is out of range\n  hint: the file has 8 vertices"
+        );
+    }
+
+    #[test]
+    fn the_caret_stands_under_its_column() {
+        let error = Diagnostic::error("no `b`")
+            .in_file("r.rhai")
+            .at_line(1)
+            .at_column(3)
+            .excerpt("a b");
+        assert_eq!(
+            error.to_string(),
+            "error: r.rhai:1:3: no `b`\n  | a b\n  |   ^"
         );
     }
 
