@@ -190,7 +190,7 @@ fn mentions(text: &str, word: &str) -> bool {
         let before = text[..at].chars().next_back();
         let after = text[at + word.len()..].chars().next();
         let open_end = word.ends_with(joins);
-        !before.is_some_and(joins) && !(open_end && after.is_some_and(joins))
+        !(before.is_some_and(joins) || open_end && after.is_some_and(joins))
     })
 }
 
