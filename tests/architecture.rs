@@ -17,7 +17,7 @@ const MAP: &[(&str, &str)] = &[
     ("loom", "diag task math mesh space signal"),
     ("inbetween", "diag task math mesh space"),
     ("statistics", "diag task math mesh space"),
-    ("metric", "math mesh"),
+    ("metric", "task math mesh"),
     ("edit", "diag task math mesh space signal loom"),
     ("sample", "diag task mesh loom"),
     ("demo", "math mesh"),
