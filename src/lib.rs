@@ -41,3 +41,4 @@ pub mod view;
 pub mod cli;
 pub mod io;
 pub mod pipeline;
+pub mod recipe;
