@@ -39,6 +39,7 @@ pub mod plot;
 pub mod view;
 
 pub mod cli;
+pub mod inbox;
 pub mod io;
 pub mod pipeline;
 pub mod recipe;
