@@ -1,1 +1,7 @@
 //! Numerics that have never heard of a mesh. Deterministic: the same bits on any number of threads.
+
+pub mod b_spline;
+pub mod growing_qr;
+pub mod least_squares;
+pub mod monotone;
+pub mod thin_plate;
