@@ -1,1 +1,12 @@
 //! The operations that the command line, recipes and the studio all call, over a World and a Task.
+
+mod input;
+mod lanes;
+mod open;
+mod output;
+mod save;
+
+pub use input::{FrameRange, InputSpec};
+pub use open::{Capture, Content, Origin, open};
+pub use output::{Output, Plan, plan};
+pub use save::{Saved, save};

@@ -1,0 +1,34 @@
+//! Wavefront OBJ. Vertices keep the order of the file, polygons stay polygons; texture coordinates,
+//! objects, groups, materials and smoothing of the first frame are kept and written again.
+//!
+//! Read are `v` (x y z; a weight or a colour after them is dropped), `vt`, `f`, `o`, `g`, `usemtl`, `s`,
+//! `mtllib` and a comment `# fps 24`; other statements (normals, lines, curves) are passed over. A number
+//! of frames per second is written as that comment.
+
+mod first;
+mod next;
+mod statement;
+mod write;
+
+use std::sync::Arc;
+
+use super::{FirstFrame, FrameWriter, MeshFormat};
+use crate::diag::Result;
+use crate::mesh::Topology;
+
+/// Wavefront OBJ.
+pub struct Obj;
+
+impl MeshFormat for Obj {
+    fn read_first(&self, bytes: &[u8], name: &str) -> Result<FirstFrame> {
+        first::read(bytes, name)
+    }
+
+    fn read_next(&self, bytes: &[u8], first: &FirstFrame, positions: &mut [f32]) -> Result<()> {
+        next::read(bytes, first, positions)
+    }
+
+    fn writer(&self, topology: &Arc<Topology>, fps: Option<f64>) -> Box<dyn FrameWriter> {
+        Box::new(write::ObjWriter::new(topology, fps))
+    }
+}

@@ -1,0 +1,425 @@
+//! What INPUT stands for: which files, in which order.
+//!
+//! A folder, a glob, a pattern of numbered files, a list of files, or one file. What cannot be told
+//! apart is refused with the choices, never guessed.
+
+use std::cmp::Ordering;
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use globset::GlobBuilder;
+
+use super::output::Pattern;
+use crate::diag::{Diagnostic, Result};
+use crate::format::{self, Format, NOT_YET};
+use crate::world::World;
+
+/// INPUT and the options that say how to read it.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct InputSpec {
+    /// Folders, files, globs and patterns, as the user wrote them.
+    pub paths: Vec<PathBuf>,
+    /// The mesh that gives a point cache its faces.
+    pub mesh: Option<PathBuf>,
+    /// The part of the capture that is wanted.
+    pub range: Option<FrameRange>,
+    /// Frames per second; takes precedence over what the files say.
+    pub fps: Option<f64>,
+}
+
+impl InputSpec {
+    /// One input, all of its frames.
+    pub fn new(path: impl Into<PathBuf>) -> Self {
+        InputSpec {
+            paths: vec![path.into()],
+            ..InputSpec::default()
+        }
+    }
+}
+
+/// Frames A to B, both included, counted from 1; either end may be open.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct FrameRange {
+    /// The first frame.
+    pub first: Option<usize>,
+    /// The last frame.
+    pub last: Option<usize>,
+}
+
+impl FromStr for FrameRange {
+    type Err = String;
+
+    /// `A:B`, `A:`, `:B`, or `A` alone.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let frame = |text: &str| match text.trim() {
+            "" => Ok(None),
+            text => match text.parse() {
+                Ok(0) => Err("frames are counted from 1".to_string()),
+                Ok(frame) => Ok(Some(frame)),
+                Err(_) => Err(format!("`{text}` is not a frame number")),
+            },
+        };
+        let (first, last) = text.split_once(':').unwrap_or((text, text));
+        let range = FrameRange {
+            first: frame(first)?,
+            last: frame(last)?,
+        };
+        match range {
+            FrameRange {
+                first: Some(first),
+                last: Some(last),
+            } if first > last => Err(format!("frame {first} comes after frame {last}")),
+            range => Ok(range),
+        }
+    }
+}
+
+impl FrameRange {
+    /// These frames of `frames`, from 0 and half open.
+    ///
+    /// # Errors
+    /// The range leaves the capture.
+    pub fn within(self, frames: usize) -> Result<Range<usize>> {
+        let (first, last) = (self.first.unwrap_or(1), self.last.unwrap_or(frames));
+        if first >= 1 && first <= last && last <= frames {
+            return Ok(first - 1..last);
+        }
+        Diagnostic::error(format!(
+            "the range {first}:{last} leaves the capture, which has {frames} frames"
+        ))
+        .hint(format!("choose within 1:{frames}"))
+        .err()
+    }
+}
+
+/// The files of a capture.
+pub(super) struct Files {
+    /// In the order of the frames.
+    pub(super) paths: Vec<PathBuf>,
+    pub(super) format: &'static Format,
+    pub(super) warnings: Vec<Diagnostic>,
+}
+
+/// Finds the files that `spec` stands for.
+pub(super) fn find(world: &dyn World, spec: &InputSpec) -> Result<Files> {
+    match spec.paths.as_slice() {
+        [] => Diagnostic::error("no input")
+            .hint("name a folder, a file, or a pattern such as 'frame_####.obj'")
+            .err(),
+        [one] => match world.identity(one)? {
+            Some(found) if found.folder => in_folder(world, one),
+            Some(_) => listed(vec![one.clone()]),
+            None => matching(world, one),
+        },
+        many => {
+            for path in many {
+                match world.identity(path)? {
+                    Some(found) if found.folder => {
+                        return Diagnostic::error("a folder in a list of files")
+                            .in_file(path)
+                            .hint("one folder is one capture")
+                            .err();
+                    }
+                    Some(_) => {}
+                    None => return Err(not_there(world, path)),
+                }
+            }
+            listed(many.to_vec())
+        }
+    }
+}
+
+/// Files in the order given, all of one format.
+fn listed(paths: Vec<PathBuf>) -> Result<Files> {
+    let mut formats = Vec::with_capacity(paths.len());
+    for path in &paths {
+        formats.push(format_of(path)?);
+    }
+    let format = formats[0];
+    if let Some(at) = formats.iter().position(|one| one.name != format.name) {
+        return Diagnostic::error(format!(
+            "{} files among {} files",
+            formats[at].name, format.name
+        ))
+        .in_file(&paths[at])
+        .hint("a capture has files of one format")
+        .err();
+    }
+    let warnings = gaps(&paths);
+    Ok(Files {
+        paths,
+        format,
+        warnings,
+    })
+}
+
+/// The format that the ending of `path` names.
+pub(super) fn format_of(path: &Path) -> Result<&'static Format> {
+    let ending = path
+        .extension()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned();
+    if let Some(format) = format::by_ending(&ending) {
+        return Ok(format);
+    }
+    let unknown = Diagnostic::error(
+        match NOT_YET
+            .iter()
+            .find(|(known, _)| known.eq_ignore_ascii_case(&ending))
+        {
+            Some((_, name)) => format!("{name} files cannot be read or written yet"),
+            None if ending.is_empty() => "a file without an ending".to_string(),
+            None => format!("no format has the ending .{ending}"),
+        },
+    );
+    unknown.in_file(path).hint(endings()).err()
+}
+
+fn endings() -> String {
+    let all: Vec<String> = format::FORMATS
+        .iter()
+        .flat_map(|format| format.endings)
+        .map(|ending| format!(".{ending}"))
+        .collect();
+    format!("known endings are {}", all.join(" "))
+}
+
+fn not_there(world: &dyn World, path: &Path) -> Box<Diagnostic> {
+    let told = Diagnostic::error("no such file or folder").in_file(path);
+    Box::new(match similar(world, path) {
+        Some(name) => told.hint(format!("did you mean {}?", name.display())),
+        None => told,
+    })
+}
+
+/// The entry of the same folder whose name is closest, if it is close.
+fn similar(world: &dyn World, path: &Path) -> Option<PathBuf> {
+    let name = path.file_name()?.to_string_lossy();
+    let folder = parent(path);
+    let entries = world.list(folder).ok()?;
+    let distance = |entry: &str| strsim::damerau_levenshtein(entry, &name);
+    entries
+        .iter()
+        .map(|entry| entry.name.to_string_lossy())
+        .filter(|entry| distance(entry) <= 2)
+        .min_by_key(|entry| distance(entry))
+        .map(|entry| path.with_file_name(entry.as_ref()))
+}
+
+pub(super) fn parent(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    }
+}
+
+/// The capture in a folder: what remains when hidden files and unknown endings are passed over must be
+/// one sequence.
+fn in_folder(world: &dyn World, folder: &Path) -> Result<Files> {
+    let mut paths: Vec<PathBuf> = world
+        .list(folder)?
+        .into_iter()
+        .filter(|entry| !entry.folder && !entry.name.to_string_lossy().starts_with('.'))
+        .map(|entry| folder.join(entry.name))
+        .filter(|path| format_of(path).is_ok())
+        .collect();
+    if paths.is_empty() {
+        return Diagnostic::error("no capture in this folder")
+            .in_file(folder)
+            .hint(endings())
+            .err();
+    }
+    sort(&mut paths);
+    let groups = groups(&paths);
+    let several = groups.len() > 1 && groups.values().any(|group| group.len() > 1);
+    let formats = paths.iter().filter_map(|path| path.extension());
+    let mixed = formats.collect::<std::collections::BTreeSet<_>>().len() > 1;
+    if several || mixed {
+        return ambiguous(folder, &groups);
+    }
+    listed(paths)
+}
+
+/// Names without their last number: `frame_0012.obj` is of the group (`frame_`, `.obj`).
+fn groups(paths: &[PathBuf]) -> BTreeMap<(String, String), Vec<&Path>> {
+    let mut groups: BTreeMap<_, Vec<&Path>> = BTreeMap::new();
+    for path in paths {
+        let name = name(path);
+        let key = match number(&name) {
+            Some(digits) => (
+                name[..digits.start].to_string(),
+                name[digits.end..].to_string(),
+            ),
+            None => (name, String::new()),
+        };
+        groups.entry(key).or_default().push(path);
+    }
+    groups
+}
+
+fn ambiguous(folder: &Path, groups: &BTreeMap<(String, String), Vec<&Path>>) -> Result<Files> {
+    let choices: Vec<String> = groups
+        .iter()
+        .take(8)
+        .map(|((before, after), paths)| {
+            let sequence = format!("{before}####{after}");
+            let name = if paths.len() > 1 {
+                sequence
+            } else {
+                name(paths[0])
+            };
+            let files = if paths.len() == 1 { "file" } else { "files" };
+            format!(
+                "'{}' ({} {files})",
+                folder.join(name).display(),
+                paths.len()
+            )
+        })
+        .collect();
+    Diagnostic::error("more than one capture in this folder")
+        .in_file(folder)
+        .hint(format!("choose one: {}", choices.join(", ")))
+        .err()
+}
+
+/// Files that a pattern (`####`, `%04d`) or a glob stands for, in natural order.
+fn matching(world: &dyn World, path: &Path) -> Result<Files> {
+    let text = path.to_string_lossy();
+    let mut paths = if let Some(pattern) = Pattern::parse(path) {
+        let mut numbered: Vec<(u64, PathBuf)> = pattern.files(world)?;
+        numbered.sort();
+        numbered.into_iter().map(|(_, path)| path).collect()
+    } else if text.contains(['*', '?', '[', '{']) {
+        glob(world, path)?
+    } else {
+        return Err(not_there(world, path));
+    };
+    if paths.is_empty() {
+        return Diagnostic::error("nothing matches this pattern")
+            .in_file(path)
+            .err();
+    }
+    sort(&mut paths);
+    listed(paths)
+}
+
+/// Files below the part of `pattern` that names no wildcard.
+fn glob(world: &dyn World, pattern: &Path) -> Result<Vec<PathBuf>> {
+    let text = pattern.to_string_lossy();
+    let matcher = GlobBuilder::new(&text).literal_separator(true).build();
+    let matcher = match matcher {
+        Ok(glob) => glob.compile_matcher(),
+        Err(error) => {
+            let reason = error.kind().to_string();
+            return Diagnostic::error(format!("not a pattern: {reason}"))
+                .in_file(pattern)
+                .err();
+        }
+    };
+    let wild = |part: &Path| part.to_string_lossy().contains(['*', '?', '[', '{']);
+    let base = pattern
+        .ancestors()
+        .find(|above| !wild(above))
+        .unwrap_or(Path::new(""));
+    let depth = if text.contains("**") {
+        usize::MAX
+    } else {
+        pattern.components().count() - base.components().count()
+    };
+    let mut found = Vec::new();
+    walk(world, base, depth, &mut found)?;
+    found.retain(|path| matcher.is_match(path));
+    Ok(found)
+}
+
+fn walk(world: &dyn World, folder: &Path, depth: usize, found: &mut Vec<PathBuf>) -> Result<()> {
+    let here = if folder.as_os_str().is_empty() {
+        Path::new(".")
+    } else {
+        folder
+    };
+    for entry in world.list(here)? {
+        let path = folder.join(&entry.name);
+        if !entry.folder {
+            found.push(path);
+        } else if depth > 1 && !entry.name.to_string_lossy().starts_with('.') {
+            walk(world, &path, depth - 1, found)?;
+        }
+    }
+    Ok(())
+}
+
+/// Natural order (`f2` before `f10`), ties by their bytes.
+fn sort(paths: &mut [PathBuf]) {
+    paths.sort_by(|a, b| {
+        let (x, y) = (a.to_string_lossy(), b.to_string_lossy());
+        natord::compare(&x, &y).then_with(|| a.cmp(b))
+    });
+}
+
+fn name(path: &Path) -> String {
+    path.file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned()
+}
+
+/// Where the last number before the ending of a file name stands.
+fn number(name: &str) -> Option<Range<usize>> {
+    let stem = name.rfind('.').unwrap_or(name.len());
+    let end = name[..stem].rfind(|letter: char| letter.is_ascii_digit())? + 1;
+    let start = name[..end]
+        .rfind(|letter: char| !letter.is_ascii_digit())
+        .map_or(0, |at| {
+            at + name[at..].chars().next().map_or(1, char::len_utf8)
+        });
+    Some(start..end)
+}
+
+/// Warnings where the numbers of a sequence break its own stride.
+fn gaps(paths: &[PathBuf]) -> Vec<Diagnostic> {
+    let numbers: Option<Vec<u64>> = paths
+        .iter()
+        .map(|path| {
+            let name = name(path);
+            name[number(&name)?].parse().ok()
+        })
+        .collect();
+    let Some(numbers) = numbers.filter(|_| groups(paths).len() == 1) else {
+        return Vec::new();
+    };
+    let steps: Vec<u64> = numbers
+        .windows(2)
+        .map(|pair| pair[1].saturating_sub(pair[0]))
+        .collect();
+    let Some(stride) = usual(&steps) else {
+        return Vec::new();
+    };
+    let broken = |at: &usize| match steps[*at].cmp(&stride) {
+        Ordering::Equal => None,
+        _ => Some(
+            Diagnostic::warning(format!(
+                "the numbers go from {} to {}, elsewhere by {stride}",
+                numbers[*at],
+                numbers[at + 1]
+            ))
+            .in_file(&paths[at + 1])
+            .hint("frames may be missing; they are taken as equally spaced in time"),
+        ),
+    };
+    (0..steps.len()).filter_map(|at| broken(&at)).collect()
+}
+
+/// The most frequent step, the smallest of several; none if there are fewer than two steps.
+fn usual(steps: &[u64]) -> Option<u64> {
+    let mut counts = BTreeMap::new();
+    for step in steps {
+        *counts.entry(*step).or_insert(0_usize) += 1;
+    }
+    let most = *counts.values().max()?;
+    let stride = counts.into_iter().find(|(_, count)| *count == most)?.0;
+    (steps.len() > 1).then_some(stride)
+}

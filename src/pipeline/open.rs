@@ -1,0 +1,130 @@
+//! INPUT to a capture in memory: the first file gives the connectivity, the others go straight into
+//! their place in one row of f32.
+
+use std::path::{Path, PathBuf};
+
+use super::input::{self, Files, InputSpec};
+use super::lanes;
+use crate::diag::{Diagnostic, Result, Warned};
+use crate::format::{self, FirstFrame, Kind, MeshFormat};
+use crate::mesh::Sequence;
+use crate::task::Task;
+use crate::world::World;
+
+/// What INPUT held.
+#[derive(Debug, Clone)]
+pub struct Capture {
+    /// The frames.
+    pub content: Content,
+    /// Where they came from.
+    pub origin: Origin,
+}
+
+/// Frames, in one form or another.
+#[derive(Debug, Clone)]
+pub enum Content {
+    /// Frames in memory.
+    Sequence(Sequence),
+}
+
+/// Where a capture came from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Origin {
+    /// The name of its format.
+    pub format: &'static str,
+    /// The files it was read from, in order.
+    pub files: Vec<PathBuf>,
+    /// Their length together, in bytes.
+    pub bytes: u64,
+}
+
+/// Opens a capture.
+///
+/// # Errors
+/// Nothing is there, what is there cannot be told apart, a file is damaged, or the frames do not share
+/// one connectivity. Cancellation.
+pub fn open(world: &dyn World, spec: &InputSpec, task: &Task) -> Result<Warned<Capture>> {
+    let files = input::find(world, spec)?;
+    task.phase("load", files.paths.len());
+    let (sequence, origin) = match files.format.kind {
+        Kind::Mesh(format) => read_meshes(world, spec, &files, format, task)?,
+    };
+    let fps = spec.fps.or(crate::mesh::FrameSource::fps(&sequence));
+    Ok(Warned {
+        output: Capture {
+            content: Content::Sequence(sequence.with_fps(fps)),
+            origin,
+        },
+        warnings: files.warnings,
+    })
+}
+
+/// One file a frame.
+fn read_meshes(
+    world: &dyn World,
+    spec: &InputSpec,
+    files: &Files,
+    format: &dyn MeshFormat,
+    task: &Task,
+) -> Result<(Sequence, Origin)> {
+    if let Some(mesh) = &spec.mesh {
+        return Diagnostic::error("a mesh is given for files that have faces of their own")
+            .in_file(mesh)
+            .hint("leave --mesh out: it is for point caches")
+            .err();
+    }
+    let range = spec.range.unwrap_or_default().within(files.paths.len())?;
+    let paths = &files.paths[range];
+    let mut bytes = 0;
+    for path in paths {
+        bytes += world.identity(path)?.map_or(0, |found| found.length);
+    }
+    let first = first_frame(world, &paths[0], format)?;
+    task.step();
+    let width = first.positions.len();
+    let mut positions = vec![0.0; width * paths.len()];
+    positions[..width].copy_from_slice(&first.positions);
+    let rest = positions[width..].chunks_exact_mut(width).zip(&paths[1..]);
+    let longest = bytes / paths.len() as u64;
+    let lanes = lanes::within(READ_AHEAD + 4 * (width * paths.len()) as u64, longest);
+    lanes::run(rest, lanes, task, |buffer: &mut Vec<u8>, (target, path)| {
+        world.read_into(path, buffer)?;
+        let read = format.read_next(buffer, &first, target);
+        read.map_err(|error| in_file(error, path, buffer))
+    })?;
+    let origin = Origin {
+        format: files.format.name,
+        files: paths.to_vec(),
+        bytes,
+    };
+    Ok((Sequence::new(first.topology, positions, first.fps), origin))
+}
+
+/// Files that are read at the same time hold at most this many bytes more than the frames themselves.
+const READ_AHEAD: u64 = 24 << 20;
+
+/// The frame that gives the connectivity.
+fn first_frame(world: &dyn World, path: &Path, format: &dyn MeshFormat) -> Result<FirstFrame> {
+    let bytes = world.read(path)?;
+    let read = format.read_first(&bytes, &path.display().to_string());
+    read.map_err(|error| in_file(error, path, &bytes))
+}
+
+/// Adds the file to what its format said, and what the file seems to be instead.
+fn in_file(mut error: Box<Diagnostic>, path: &Path, bytes: &[u8]) -> Box<Diagnostic> {
+    error.place.file = Some(path.to_path_buf());
+    let ending = path.extension().unwrap_or_default().to_string_lossy();
+    match format::by_content(bytes) {
+        Some(found) if !found.endings.contains(&&*ending.to_ascii_lowercase()) => {
+            let told = Diagnostic::error(format!(
+                "by its content this is a {} file, by its ending it is not",
+                found.name
+            ));
+            Box::new(
+                told.in_file(path)
+                    .hint(format!("name it .{}", found.endings[0])),
+            )
+        }
+        _ => error,
+    }
+}

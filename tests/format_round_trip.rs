@@ -1,0 +1,202 @@
+//! What is written reads back the same, format by format; inputs of every form name the same frames.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use meshloom::format::{FORMATS, Kind};
+use meshloom::mesh::{FrameSource, Sequence, Topology};
+use meshloom::pipeline::{Capture, Content, FrameRange, InputSpec, Output, open, save};
+use meshloom::task::Task;
+use meshloom::world::{MemoryWorld, World};
+
+/// Six vertices (one in no face), a quad, a triangle and a pentagon, coordinates of every size.
+fn capture(frames: usize) -> Sequence {
+    let topology = Topology::new(6, &[4, 3, 5], vec![3, 2, 1, 0, 0, 1, 4, 4, 3, 2, 1, 0]).unwrap();
+    let values = (0..frames * 18).map(|i| {
+        let size = 10_f32.powi(i as i32 % 41 - 20);
+        (i as f32 * 0.7).sin() * size
+    });
+    Sequence::new(Arc::new(topology), values.collect(), None)
+}
+
+fn sequence(capture: Capture) -> Sequence {
+    let Content::Sequence(sequence) = capture.content;
+    sequence
+}
+
+fn read(world: &dyn World, spec: &InputSpec) -> Sequence {
+    let opened = open(world, spec, &Task::default()).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(opened.warnings, [], "no warnings expected");
+    sequence(opened.output)
+}
+
+fn write(world: &dyn World, source: &dyn FrameSource, path: &str) -> Vec<String> {
+    let saved = save(world, source, &Output::from(path), &Task::default());
+    let saved = saved.unwrap_or_else(|error| panic!("{error}"));
+    let names = saved.outputs.iter();
+    names.map(|path| path.display().to_string()).collect()
+}
+
+#[test]
+fn every_mesh_format_gives_back_what_it_was_given() {
+    for format in FORMATS {
+        let Kind::Mesh(_) = format.kind;
+        for ending in format.endings {
+            let world = MemoryWorld::new();
+            let given = capture(3);
+            let out = format!("out/f####.{ending}");
+            let names = write(&world, &given, &out);
+            assert_eq!(names[2], format!("out/f0003.{ending}"));
+            let back = read(&world, &InputSpec::new(out));
+            assert_eq!(back.positions(), given.positions(), "{}", format.name);
+            assert!(
+                back.topology().same_connectivity(given.topology()),
+                "{}",
+                format.name
+            );
+        }
+    }
+}
+
+#[test]
+fn all_forms_of_input_name_the_same_frames() {
+    let world = MemoryWorld::new();
+    let given = capture(11);
+    write(&world, &given, "a/cap/f%d.obj");
+    let list = (1..12).map(|i| format!("a/cap/f{i}.obj").into()).collect();
+    let list = InputSpec {
+        paths: list,
+        ..InputSpec::default()
+    };
+    let forms = [
+        "a/cap",
+        "a/cap/",
+        "a/cap/f*.obj",
+        "a/*/*.obj",
+        "a/**/f*.obj",
+        "a/cap/f#.obj",
+        "a/cap/f%d.obj",
+    ];
+    for spec in forms.map(InputSpec::new).into_iter().chain([list]) {
+        let back = read(&world, &spec);
+        assert_eq!(back.positions(), given.positions(), "{:?}", spec.paths);
+    }
+    let part = InputSpec {
+        range: Some(FrameRange {
+            first: Some(3),
+            last: None,
+        }),
+        fps: Some(24.0),
+        ..InputSpec::new("a/cap")
+    };
+    let back = read(&world, &part);
+    assert_eq!(back.positions(), given.slice(2..11).positions());
+    assert_eq!(back.fps(), Some(24.0));
+}
+
+#[test]
+fn a_shorter_run_removes_the_longer_ones_frames_and_nothing_else() {
+    let world = MemoryWorld::new();
+    write(&world, &capture(5), "out");
+    world.insert("out/frame_notes.txt", *b"mine");
+    world.insert("out/frame_000007.obj", *b"another padding");
+    write(&world, &capture(2), "out");
+    let left = world.paths();
+    let left: Vec<_> = left.iter().filter_map(|path| path.to_str()).collect();
+    let frames = ["out/frame_0001.obj", "out/frame_0002.obj"];
+    assert_eq!(left[0], "out/frame_000007.obj");
+    assert_eq!(left[1..3], frames);
+    assert_eq!(left[3..], ["out/frame_notes.txt"]);
+}
+
+#[test]
+fn inputs_are_not_written_over() {
+    let world = MemoryWorld::new();
+    write(&world, &capture(3), "a");
+    let opened = open(&world, &InputSpec::new("a"), &Task::default()).unwrap();
+    let files = opened.output.origin.files.clone();
+    let output = Output::from("a").protecting(&files);
+    let before = world.read(Path::new("a/frame_0001.obj")).unwrap();
+    let error = save(&world, &sequence(opened.output), &output, &Task::default()).unwrap_err();
+    assert_eq!(error.message, "the output would replace an input");
+    assert_eq!(world.read(Path::new("a/frame_0001.obj")).unwrap(), before);
+}
+
+#[test]
+fn cancelled_saving_changes_nothing() {
+    let world = MemoryWorld::new();
+    write(&world, &capture(3), "a");
+    let task = Task::default();
+    task.cancel();
+    let ended = save(&world, &capture(5), &Output::from("a"), &task);
+    assert_eq!(ended.unwrap_err().message, "interrupted");
+    assert_eq!(world.paths().len(), 3);
+}
+
+const QUADS: &str = "\
+mtllib cloth.mtl
+o sheet
+v 0 0 0
+v 1 0 0
+v 1 1 0
+v 0 1 0
+v 2 0 0
+v 2 1 0
+vt 0 0
+vt 1 0
+vt 0.5 1
+g left side
+usemtl blue
+s 1
+f 1/1 2/2 3/3 4
+g right
+s off
+f 2/2 5/1 6/3 3/3
+";
+
+#[test]
+fn texture_coordinates_and_groups_are_written_again() {
+    let world = MemoryWorld::new();
+    world.insert("a.obj", QUADS);
+    write(&world, &read(&world, &InputSpec::new("a.obj")), "b.obj");
+    let written = String::from_utf8(world.read(Path::new("b.obj")).unwrap()).unwrap();
+    let (names, rest): (Vec<_>, Vec<_>) = QUADS.lines().partition(|line| line.starts_with('o'));
+    let mut expected: Vec<&str> = rest;
+    let first_name = expected
+        .iter()
+        .position(|line| line.starts_with("g "))
+        .unwrap();
+    expected.splice(first_name..first_name, names);
+    assert_eq!(written.lines().collect::<Vec<_>>(), expected);
+}
+
+#[test]
+fn obj_as_people_write_it() {
+    let plain = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 5 5 5\nf 1 2 3\nf 1 3 4\n";
+    let odd = "# made by hand\r\n\r\nv  0 0\\\n 0   \r\n  v\t1 0 0 1.0\nvn 0 0 1\nv 0 1 0 0.1 0.2 0.3\nf -3// -2//1 -1/ # first\nv 5e0 +5 .5e1\np 1\nf 1 3 \\\n -1";
+    let world = MemoryWorld::new();
+    world.insert("plain.obj", plain);
+    world.insert("odd.obj", odd);
+    let (plain, odd) = ("plain.obj", "odd.obj");
+    for names in [[plain, odd], [odd, plain], [odd, odd]] {
+        let spec = InputSpec {
+            paths: names.iter().map(Into::into).collect(),
+            ..InputSpec::default()
+        };
+        let both = read(&world, &spec);
+        assert_eq!(both.frame(0), both.frame(1));
+        assert_eq!(both.frame(0)[9..], [5.0; 3]);
+        assert_eq!(both.topology().face(1), [0, 2, 3]);
+    }
+}
+
+#[test]
+fn missing_numbers_are_warned_of() {
+    let world = MemoryWorld::new();
+    for number in [1, 3, 5, 9, 11] {
+        write(&world, &capture(1), &format!("a/f{number:02}.obj"));
+    }
+    let opened = open(&world, &InputSpec::new("a"), &Task::default()).unwrap();
+    let messages: Vec<_> = opened.warnings.iter().map(|w| w.message.as_str()).collect();
+    assert_eq!(messages, ["the numbers go from 5 to 9, elsewhere by 2"]);
+}
