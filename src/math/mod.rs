@@ -4,4 +4,6 @@ pub mod b_spline;
 pub mod growing_qr;
 pub mod least_squares;
 pub mod monotone;
+pub mod rotation;
+pub mod sparse;
 pub mod thin_plate;
