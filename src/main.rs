@@ -1,3 +1,7 @@
 //! The `meshloom` command: see [`meshloom`] for the library.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    meshloom::cli::run()
+}

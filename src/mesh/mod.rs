@@ -1,10 +1,12 @@
 //! One topology, many positions. Connectivity is held once ([`Topology`]); a shape is a slice of 3V
 //! coordinates, x y z interleaved, in the units of the file it came from.
 
+mod bounds;
 mod edges;
 mod sequence;
 mod topology;
 
+pub use bounds::Bounds;
 pub use edges::Edges;
 pub use sequence::{FrameSource, Sequence};
 pub use topology::{Attributes, Group, GroupKind, Topology, TopologyError};

@@ -1,5 +1,6 @@
 //! The operations that the command line, recipes and the studio all call, over a World and a Task.
 
+mod frames;
 mod input;
 mod lanes;
 mod open;

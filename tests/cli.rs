@@ -1,0 +1,287 @@
+//! The command line's contracts, through the real binary: JSON keys, exit codes, what goes where.
+
+mod support;
+
+use std::fs;
+use std::io::Read;
+use std::process::Stdio;
+
+use support::capture::sheet;
+use support::{command, keys, meshloom, run};
+use tempfile::tempdir;
+
+#[test]
+fn info_says_what_a_capture_holds() {
+    let folder = tempdir().unwrap();
+    sheet(5, 3).write_objs(&folder.path().join("sheet"));
+    let info = meshloom(folder.path(), "info sheet --json").done().object();
+    assert_eq!(
+        keys(&info),
+        [
+            "boundary_edges",
+            "bounds",
+            "bytes",
+            "closed",
+            "components",
+            "edges",
+            "faces",
+            "format",
+            "fps",
+            "frames",
+            "vertices",
+        ]
+    );
+    let count = |key: &str| info[key].as_u64().unwrap();
+    // A grid of 5 x 5 vertices: 2 * 5 * 4 sides and 16 diagonals, 16 of the sides on the border.
+    assert_eq!(
+        [count("frames"), count("vertices"), count("faces")],
+        [3, 25, 32]
+    );
+    assert_eq!(
+        [count("edges"), count("boundary_edges"), count("components")],
+        [56, 16, 1]
+    );
+    assert_eq!(
+        (info["closed"].as_bool(), info["format"].as_str()),
+        (Some(false), Some("OBJ"))
+    );
+    assert!(info["fps"].is_null());
+    assert_eq!(info["bounds"]["max"][0], 4.0);
+}
+
+#[test]
+fn a_part_of_a_capture_is_a_capture() {
+    let folder = tempdir().unwrap();
+    let capture = sheet(4, 9);
+    capture.write_objs(&folder.path().join("sheet"));
+    meshloom(folder.path(), "convert sheet --range 3:5 -o part/f_##.obj").done();
+    let names: Vec<_> = fs::read_dir(folder.path().join("part")).unwrap().collect();
+    assert_eq!(names.len(), 3);
+    let info = meshloom(folder.path(), "info part --json").done().object();
+    assert_eq!(info["frames"], 3);
+    let same = meshloom(
+        folder.path(),
+        "compare part/f_##.obj sheet --range 1:3 --json",
+    )
+    .done();
+    assert!(
+        same.object()["kg_percent"].as_f64().unwrap() > 1.0,
+        "other frames differ"
+    );
+}
+
+#[test]
+fn comparing_with_itself_finds_nothing() {
+    let folder = tempdir().unwrap();
+    sheet(4, 5).write_objs(&folder.path().join("sheet"));
+    let found = meshloom(folder.path(), "compare sheet sheet --json")
+        .done()
+        .object();
+    assert_eq!(
+        keys(&found),
+        [
+            "edge_max_percent",
+            "edge_rms_percent",
+            "frames",
+            "kg_percent",
+            "max",
+            "rms"
+        ]
+    );
+    for key in [
+        "kg_percent",
+        "rms",
+        "max",
+        "edge_rms_percent",
+        "edge_max_percent",
+    ] {
+        assert_eq!(found[key], 0.0, "{key}");
+    }
+    assert_eq!(found["frames"], 5);
+}
+
+#[test]
+fn converting_there_and_back_changes_no_bit() {
+    let folder = tempdir().unwrap();
+    sheet(4, 5).write_objs(&folder.path().join("sheet"));
+    let saved = meshloom(folder.path(), "convert sheet -o again/f_####.obj --json")
+        .done()
+        .object();
+    assert_eq!(saved["frames"], 5);
+    assert_eq!(saved["outputs"][4], "again/f_0005.obj");
+    let found = meshloom(folder.path(), "compare sheet again --json")
+        .done()
+        .object();
+    assert_eq!(found["max"], 0.0);
+}
+
+#[test]
+fn people_read_stderr_and_scripts_stdout() {
+    let folder = tempdir().unwrap();
+    sheet(4, 2).write_objs(&folder.path().join("sheet"));
+    let run = meshloom(folder.path(), "info sheet").done();
+    assert_eq!(run.stdout, "");
+    assert!(
+        run.stderr.contains("vertices") && !run.stderr.contains('\x1b'),
+        "{}",
+        run.stderr
+    );
+    let run = meshloom(folder.path(), "info sheet --quiet --json").done();
+    assert_eq!(run.stderr, "");
+    assert_eq!(run.stdout.lines().count(), 1);
+}
+
+#[test]
+fn failures_are_data_too() {
+    let folder = tempdir().unwrap();
+    fs::write(
+        folder.path().join("a.obj"),
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n",
+    )
+    .unwrap();
+    let run = meshloom(folder.path(), "info a.obj --json");
+    run.fails_with(&["a.obj:4", "9"]);
+    let error = &run.object()["error"];
+    assert_eq!(error["severity"], "error");
+    assert_eq!(
+        (error["file"].as_str(), error["line"].as_u64()),
+        (Some("a.obj"), Some(4))
+    );
+    assert!(error["message"].is_string() && error["hints"].is_array());
+}
+
+#[test]
+fn wrong_usage_is_2_and_says_so_as_data_as_well() {
+    let folder = tempdir().unwrap();
+    for args in [
+        "",
+        "nonsense",
+        "info",
+        "info x --range 0:3",
+        "info x --range 5:3",
+        "info x --threads 0",
+        "convert x",
+        "doctor --nope",
+    ] {
+        let run = meshloom(folder.path(), args);
+        assert_eq!(
+            (run.code, run.stdout.as_str()),
+            (Some(2), ""),
+            "{args}: {}",
+            run.stderr
+        );
+    }
+    let run = meshloom(folder.path(), "info --json");
+    assert_eq!(run.code, Some(2));
+    assert_eq!(run.object()["error"]["severity"], "error");
+}
+
+#[test]
+fn help_and_version_are_asked_for_and_go_to_stdout() {
+    let folder = tempdir().unwrap();
+    let help = meshloom(folder.path(), "--help").done();
+    assert!(help.stdout.contains("Usage: meshloom") && help.stderr.is_empty());
+    let version = meshloom(folder.path(), "--version").done();
+    assert_eq!(
+        version.stdout,
+        format!("meshloom {}\n", env!("CARGO_PKG_VERSION"))
+    );
+}
+
+#[test]
+fn completions_and_manual_name_every_subcommand() {
+    let folder = tempdir().unwrap();
+    let help = meshloom(folder.path(), "--help").done().stdout;
+    let commands = help.lines().skip_while(|line| *line != "Commands:").skip(1);
+    let commands: Vec<&str> = commands
+        .take_while(|line| !line.is_empty())
+        .filter_map(|line| line.split_whitespace().next())
+        .filter(|name| *name != "help")
+        .collect();
+    assert!(commands.contains(&"info"));
+    let manual = meshloom(folder.path(), "man").done().stdout;
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let script = meshloom(folder.path(), &format!("completions {shell}"))
+            .done()
+            .stdout;
+        for name in &commands {
+            assert!(script.contains(name), "{shell}: {name}");
+        }
+    }
+    for name in commands {
+        assert!(
+            manual.contains(&format!(".TH meshloom\\-{name}"))
+                || manual.contains(&format!(".TH meshloom-{name}")),
+            "{name}"
+        );
+    }
+}
+
+#[test]
+fn threads_come_from_the_flag_then_the_scheduler() {
+    let folder = tempdir().unwrap();
+    let machine = |args: &str, slurm: Option<&str>| {
+        let mut command = command(folder.path(), args.split_whitespace());
+        command.envs(slurm.map(|count| ("SLURM_CPUS_PER_TASK", count)));
+        run(command).done().object()["machine"].clone()
+    };
+    let flag = machine("doctor --json --threads 3", Some("5"));
+    assert_eq!(
+        (flag["threads"].as_u64(), flag["threads_from"].as_str()),
+        (Some(3), Some("--threads"))
+    );
+    let slurm = machine("doctor --json", Some("5"));
+    assert_eq!(
+        (slurm["threads"].as_u64(), slurm["threads_from"].as_str()),
+        (Some(5), Some("SLURM_CPUS_PER_TASK"))
+    );
+    let cores = machine("doctor --json", None);
+    assert_eq!(cores["threads"], cores["cores"]);
+    assert_eq!(
+        machine("doctor --json", Some("many"))["threads_from"],
+        "cores"
+    );
+}
+
+#[test]
+fn a_reader_that_leaves_is_no_error() {
+    let folder = tempdir().unwrap();
+    let mut command = command(folder.path(), ["man"]);
+    let mut child = command
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let mut stderr = String::new();
+    child
+        .stderr
+        .take()
+        .unwrap()
+        .read_to_string(&mut stderr)
+        .unwrap();
+    assert_eq!(
+        (child.wait().unwrap().code(), stderr.as_str()),
+        (Some(0), "")
+    );
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_full_stdout_is_an_error() {
+    let folder = tempdir().unwrap();
+    let mut command = command(folder.path(), ["doctor", "--json"]);
+    command.stdout(
+        fs::OpenOptions::new()
+            .write(true)
+            .open("/dev/full")
+            .unwrap(),
+    );
+    let run = run(command);
+    assert_eq!(run.code, Some(1));
+    assert!(
+        run.stderr.contains("stdout cannot be written"),
+        "{}",
+        run.stderr
+    );
+}
