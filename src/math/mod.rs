@@ -2,8 +2,11 @@
 
 pub mod b_spline;
 pub mod growing_qr;
+pub mod layout;
 pub mod least_squares;
 pub mod monotone;
+pub mod pca;
 pub mod rotation;
 pub mod sparse;
+pub mod symmetric;
 pub mod thin_plate;

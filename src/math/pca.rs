@@ -1,0 +1,686 @@
+//! Principal component analysis of few long rows (n << d), CH12 §2.1 and §3.1.
+//!
+//! Y = Z - 1 h0^T is n x d, h0 the mean row. The n x n Gram matrix Y Y^T = U D^2 U^T is summed over
+//! panels of columns in f64, each half of the symmetric matrix once, whatever the rows are stored in.
+//! The m leading right singular vectors follow from W = Y^T U, whose columns are orthogonal up to the
+//! Gram matrix's resolution, by an orthogonal factorisation W = H R done twice (Cholesky factors of
+//! W^T W, which are backward stable once the columns are this close to orthogonal): H keeps
+//! ||H^T H - I|| at rounding, and X = Y H is computed from the rows again.
+//!
+//! A Gram matrix in f64 cannot tell modes below 1e-8 ||Y|| from rounding. Whoever asks for modes below
+//! 1e-6 ||Y|| pays for one more pass, W^T W with column pivoting over all n columns, which tells them
+//! apart down to 1e-13 ||Y||.
+//!
+//! Sums over panels run in a fixed number of groups and are added in order: the result does not depend
+//! on the number of threads.
+
+use std::fmt;
+use std::ops::Range;
+
+use faer::linalg::matmul::matmul;
+use faer::linalg::matmul::triangular::{self, BlockStructure};
+use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
+use faer::{Accum, Mat, MatMut, MatRef, Par};
+use rayon::prelude::*;
+
+use super::symmetric;
+use crate::task::{Cancelled, Task};
+
+/// Modes below this part of ||Y|| are nothing: rows that lie in a plane up to f64 rounding lie in it.
+pub const RANK_CUT: f64 = 1e-13;
+
+/// Modes above this part of ||Y|| are resolved by the Gram matrix: its eigenvalues err by 1e-16 n of the
+/// largest, so these by less than a thousandth.
+const RESOLVED: f64 = 1e-6;
+
+/// A panel holds about this many numbers: 2 MB stay in the second-level cache.
+const PANEL: usize = 1 << 18;
+
+/// Panels are a multiple of this many columns: whole vectors of three, whole cache lines.
+const COLUMN_STEP: usize = 192;
+
+/// The groups' partial sums together hold at most this many numbers (16 MB).
+const PARTIAL_SUMS: usize = 1 << 21;
+
+/// A matrix that is read by pieces of its rows: frames in f32, coordinates in f64, anything between.
+pub trait Rows: Sync {
+    /// n, how many rows there are.
+    fn rows(&self) -> usize;
+
+    /// d, how many columns there are.
+    fn columns(&self) -> usize;
+
+    /// Writes the entries `range` of `row` to `out`, which is as long as the range. Ranges start at
+    /// multiples of three.
+    fn copy(&self, row: usize, range: Range<usize>, out: &mut [f64]);
+}
+
+/// Rows of f64 stored one after another.
+#[derive(Debug, Clone, Copy)]
+pub struct Table<'a> {
+    values: &'a [f64],
+    columns: usize,
+}
+
+impl<'a> Table<'a> {
+    /// `values.len() / columns` rows.
+    ///
+    /// # Panics
+    /// `values` is not a whole number of rows.
+    pub fn new(values: &'a [f64], columns: usize) -> Self {
+        assert_eq!(
+            values.len() % columns.max(1),
+            0,
+            "a table is made of whole rows"
+        );
+        Table { values, columns }
+    }
+}
+
+impl Rows for Table<'_> {
+    fn rows(&self) -> usize {
+        self.values.len().checked_div(self.columns).unwrap_or(0)
+    }
+
+    fn columns(&self) -> usize {
+        self.columns
+    }
+
+    fn copy(&self, row: usize, range: Range<usize>, out: &mut [f64]) {
+        let start = row * self.columns;
+        out.copy_from_slice(&self.values[start + range.start..start + range.end]);
+    }
+}
+
+/// Why there is no decomposition.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PcaError {
+    /// The task was cancelled.
+    Cancelled,
+    /// A row holds a number that is not finite, or whose square is not.
+    NotFinite,
+}
+
+impl fmt::Display for PcaError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            PcaError::Cancelled => "interrupted",
+            PcaError::NotFinite => "a coordinate is not finite, or too large to be squared",
+        })
+    }
+}
+
+impl std::error::Error for PcaError {}
+
+impl From<Cancelled> for PcaError {
+    fn from(_: Cancelled) -> Self {
+        PcaError::Cancelled
+    }
+}
+
+/// The mean row and the principal directions on the side of the rows: Y Y^T = U D^2 U^T.
+/// One row, or rows that do not differ, have spread 0, rank 0 and no modes.
+#[derive(Debug, Clone)]
+pub struct Pca {
+    mean: Vec<f64>,
+    /// U, n x n, a column for each singular value.
+    left: Mat<f64>,
+    singular: Vec<f64>,
+    spread: f64,
+    /// Below this a mode is nothing.
+    cut: f64,
+}
+
+/// The shape signal's parts: H (d x m), X (n x m).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Basis {
+    /// The columns of H one after another, d numbers each, orthonormal to 1e-13.
+    pub vectors: Vec<f64>,
+    /// m, at most what was asked for.
+    pub modes: usize,
+    /// X = Y H, row after row, m numbers each; the largest entry of each column is positive.
+    pub coordinates: Vec<f64>,
+    /// ||Y - X H^T||, the root of (3).
+    pub residual: f64,
+    /// The number of modes above 1e-13 ||Y||. Where no mode below 1e-6 ||Y|| was asked for, those are
+    /// not told from rounding and not counted.
+    pub rank: usize,
+}
+
+impl Pca {
+    /// Decomposes the rows: one pass over them, n^2 d multiplications.
+    ///
+    /// # Errors
+    /// [`PcaError::NotFinite`], [`PcaError::Cancelled`].
+    pub fn new(rows: &dyn Rows, task: &Task) -> Result<Self, PcaError> {
+        let (n, d) = (rows.rows(), rows.columns());
+        let mean = mean(rows, task)?;
+        let mut gram = Panels::of(n, d, 0).sum(task, n, n, |columns, sum, buffer| {
+            let panel = centred(rows, &mean, columns, buffer);
+            add_gram(panel, sum);
+        })?;
+        let squares: f64 = (0..n).map(|i| gram[(i, i)]).sum();
+        if !squares.is_finite() {
+            return Err(PcaError::NotFinite);
+        }
+        // the mean is rounded: rows that differ by less than that do not differ
+        let noise = 4.0 * f64::EPSILON * mean.iter().map(|z| z * z * n as f64).sum::<f64>().sqrt();
+        let spread = if squares.sqrt() > noise {
+            squares.sqrt()
+        } else {
+            0.0
+        };
+        if spread == 0.0 {
+            gram.fill(0.0);
+        }
+        let (values, left) = symmetric::eigen(gram.as_ref()).ok_or(PcaError::NotFinite)?;
+        Ok(Pca {
+            mean,
+            left,
+            singular: values.iter().map(|value| value.max(0.0).sqrt()).collect(),
+            spread,
+            cut: noise.max(RANK_CUT * spread),
+        })
+    }
+
+    /// n, the number of rows.
+    pub fn rows(&self) -> usize {
+        self.singular.len()
+    }
+
+    /// h0, the mean row: d numbers.
+    pub fn mean(&self) -> &[f64] {
+        &self.mean
+    }
+
+    /// ||Y||, the root of the sum of all squared distances from the mean.
+    pub fn spread(&self) -> f64 {
+        self.spread
+    }
+
+    /// The n singular values of Y in falling order; below 1e-8 ||Y|| they are rounding.
+    pub fn singular_values(&self) -> &[f64] {
+        &self.singular
+    }
+
+    /// ||Y - Y_m||, the distance to the closest rows of rank m: what m modes leave out.
+    pub fn residual(&self, modes: usize) -> f64 {
+        let left_out = self.singular.iter().skip(modes).rev();
+        left_out.map(|value| value * value).sum::<f64>().sqrt()
+    }
+
+    /// How many modes the Gram matrix resolves.
+    pub fn resolved(&self) -> usize {
+        let cut = self.cut.max(RESOLVED * self.spread);
+        self.singular
+            .iter()
+            .take_while(|&&value| value > cut)
+            .count()
+    }
+
+    /// The rows of U D, n numbers each: isometric to the rows of Y up to 1e-8 ||Y||, so that whatever
+    /// depends on distances and combinations of the rows can be done with n numbers instead of d.
+    pub fn reduced(&self) -> Vec<f64> {
+        let n = self.rows();
+        (0..n * n)
+            .map(|at| self.left[(at / n, at % n)] * self.singular[at % n])
+            .collect()
+    }
+
+    /// The m leading modes, or as many as there are. `rows` are those that were decomposed.
+    ///
+    /// # Errors
+    /// [`PcaError::Cancelled`].
+    pub fn basis(&self, rows: &dyn Rows, modes: usize, task: &Task) -> Result<Basis, PcaError> {
+        let (n, d) = (self.rows(), self.mean.len());
+        let resolved = self.resolved();
+        let (chosen, rank) = if modes <= resolved || self.spread == 0.0 {
+            (
+                self.left.get(.., ..modes.min(resolved)).to_owned(),
+                resolved,
+            )
+        } else {
+            self.pivoted(rows, modes, task)?
+        };
+        let m = chosen.ncols();
+        let mut vectors = vec![0.0; d * m];
+        let mut h = MatMut::from_column_major_slice_mut(&mut vectors, d, m);
+        self.project(rows, chosen.as_ref(), h.as_mut(), task)?;
+        for _ in 0..2 {
+            orthonormalise(h.as_mut(), task)?;
+        }
+        let mut x = self.coordinates(rows, h.as_ref(), task)?;
+        fix_signs(h.as_mut(), x.as_mut());
+        let residual = self.distance(rows, h.as_ref(), x.as_ref(), task)?;
+        let coordinates = (0..n * m).map(|at| x[(at / m, at % m)]).collect();
+        Ok(Basis {
+            vectors,
+            modes: m,
+            coordinates,
+            residual,
+            rank,
+        })
+    }
+
+    /// The columns of U that W^T W with pivoting finds independent, at most `modes`, and how many there
+    /// are in all.
+    fn pivoted(
+        &self,
+        rows: &dyn Rows,
+        modes: usize,
+        task: &Task,
+    ) -> Result<(Mat<f64>, usize), PcaError> {
+        let (n, d) = (self.rows(), self.mean.len());
+        let gram = Panels::of(n, d, n).sum(task, n, n, |columns, sum, buffer| {
+            let (panel, rotated) = buffer_pair(buffer, n * columns.len());
+            let panel = centred_into(rows, &self.mean, columns.clone(), panel);
+            let mut rotated = MatMut::from_column_major_slice_mut(rotated, columns.len(), n);
+            matmul(
+                rotated.as_mut(),
+                Accum::Replace,
+                panel,
+                self.left.as_ref(),
+                1.0,
+                Par::Seq,
+            );
+            add_gram(rotated.as_ref(), sum);
+        })?;
+        let order = symmetric::pivots(gram, self.cut * self.cut);
+        let rank = order.len();
+        let kept = &order[..rank.min(modes)];
+        Ok((
+            Mat::from_fn(n, kept.len(), |i, j| self.left[(i, kept[j])]),
+            rank,
+        ))
+    }
+
+    /// W = Y^T U.
+    fn project(
+        &self,
+        rows: &dyn Rows,
+        left: MatRef<'_, f64>,
+        target: MatMut<'_, f64>,
+        task: &Task,
+    ) -> Result<(), PcaError> {
+        let panels = Panels::of(self.rows(), self.mean.len(), left.ncols());
+        panels.each(target, task, |columns, part, buffer| {
+            let panel = centred(rows, &self.mean, columns, buffer);
+            matmul(part, Accum::Replace, panel, left, 1.0, Par::Seq);
+        })
+    }
+
+    /// X = Y H.
+    fn coordinates(
+        &self,
+        rows: &dyn Rows,
+        h: MatRef<'_, f64>,
+        task: &Task,
+    ) -> Result<Mat<f64>, PcaError> {
+        let (n, m) = (self.rows(), h.ncols());
+        Panels::of(n, self.mean.len(), m).sum(task, n, m, |columns, sum, buffer| {
+            let part = h.get(columns.clone(), ..);
+            let panel = centred(rows, &self.mean, columns, buffer);
+            matmul(sum, Accum::Add, panel.transpose(), part, 1.0, Par::Seq);
+        })
+    }
+
+    /// ||Y - X H^T||: by Pythagoras, or, where little is left and that would be rounding, from the rows.
+    fn distance(
+        &self,
+        rows: &dyn Rows,
+        h: MatRef<'_, f64>,
+        x: MatRef<'_, f64>,
+        task: &Task,
+    ) -> Result<f64, PcaError> {
+        let whole = self.spread * self.spread;
+        let left_out = whole - x.squared_norm_l2();
+        // the difference errs by some 1e-15 of the whole: below 1e-11 of it that would show
+        if left_out > 1e-11 * whole || whole == 0.0 {
+            return Ok(left_out.max(0.0).sqrt());
+        }
+        let panels = Panels::of(self.rows(), self.mean.len(), h.ncols());
+        let squares = panels.sum(task, 1, 1, |columns, mut sum, buffer| {
+            let part = h.get(columns.clone(), ..);
+            let mut panel = centred(rows, &self.mean, columns, buffer).to_owned();
+            matmul(
+                panel.as_mut(),
+                Accum::Add,
+                part,
+                x.transpose(),
+                -1.0,
+                Par::Seq,
+            );
+            sum[(0, 0)] += panel.squared_norm_l2();
+        })?;
+        Ok(squares[(0, 0)].sqrt())
+    }
+}
+
+/// How d columns are cut into panels and the panels into groups; both depend on the sizes alone.
+struct Panels {
+    columns: usize,
+    width: usize,
+}
+
+impl Panels {
+    /// For panels of `rows` columns beside others of `beside` columns.
+    fn of(rows: usize, columns: usize, beside: usize) -> Self {
+        let width = PANEL / (rows + beside).max(1) / COLUMN_STEP * COLUMN_STEP;
+        Panels {
+            columns,
+            width: width.clamp(COLUMN_STEP, 32 * COLUMN_STEP),
+        }
+    }
+
+    fn count(&self) -> usize {
+        self.columns.div_ceil(self.width)
+    }
+
+    fn range(&self, panel: usize) -> Range<usize> {
+        panel * self.width..((panel + 1) * self.width).min(self.columns)
+    }
+
+    /// The sum of what `add` adds to a matrix of zeros for each panel.
+    fn sum(
+        &self,
+        task: &Task,
+        rows: usize,
+        columns: usize,
+        add: impl Fn(Range<usize>, MatMut<'_, f64>, &mut Vec<f64>) + Sync,
+    ) -> Result<Mat<f64>, PcaError> {
+        let groups = (PARTIAL_SUMS / (rows * columns).max(1)).clamp(2, 16);
+        let group = |first: usize| {
+            let mut sum = Mat::zeros(rows, columns);
+            let mut buffer = Vec::new();
+            for panel in (first..self.count()).step_by(groups) {
+                task.check()?;
+                add(self.range(panel), sum.as_mut(), &mut buffer);
+            }
+            Ok(sum)
+        };
+        let sums: Result<Vec<Mat<f64>>, PcaError> = (0..groups.min(self.count()))
+            .into_par_iter()
+            .map(group)
+            .collect();
+        let add = |mut total: Mat<f64>, part: Mat<f64>| {
+            total += part;
+            total
+        };
+        Ok(sums?
+            .into_iter()
+            .reduce(add)
+            .unwrap_or_else(|| Mat::zeros(rows, columns)))
+    }
+
+    /// Lets `act` work on the rows of `target` that belong to each panel.
+    fn each(
+        &self,
+        target: MatMut<'_, f64>,
+        task: &Task,
+        act: impl Fn(Range<usize>, MatMut<'_, f64>, &mut Vec<f64>) + Sync,
+    ) -> Result<(), PcaError> {
+        target
+            .par_row_chunks_mut(self.width)
+            .enumerate()
+            .try_for_each_init(Vec::new, |buffer, (panel, part)| {
+                task.check()?;
+                act(self.range(panel), part, buffer);
+                Ok(())
+            })
+    }
+}
+
+/// The mean row.
+fn mean(rows: &dyn Rows, task: &Task) -> Result<Vec<f64>, PcaError> {
+    let (n, d) = (rows.rows(), rows.columns());
+    let panels = Panels::of(n, d, 0);
+    let mut mean = vec![0.0; d];
+    mean.par_chunks_mut(panels.width)
+        .enumerate()
+        .try_for_each_init(Vec::new, |buffer: &mut Vec<f64>, (panel, part)| {
+            task.check()?;
+            buffer.resize(part.len(), 0.0);
+            for row in 0..n {
+                rows.copy(row, panels.range(panel), buffer);
+                part.iter_mut().zip(&*buffer).for_each(|(sum, z)| *sum += z);
+            }
+            part.iter_mut().for_each(|sum| *sum /= n as f64);
+            Ok::<_, PcaError>(())
+        })?;
+    Ok(mean)
+}
+
+/// Columns `columns` of Y as the rows of a panel: a column-major matrix with a column for each row.
+fn centred<'a>(
+    rows: &dyn Rows,
+    mean: &[f64],
+    columns: Range<usize>,
+    buffer: &'a mut Vec<f64>,
+) -> MatRef<'a, f64> {
+    buffer.resize(rows.rows() * columns.len(), 0.0);
+    centred_into(rows, mean, columns, buffer)
+}
+
+fn centred_into<'a>(
+    rows: &dyn Rows,
+    mean: &[f64],
+    columns: Range<usize>,
+    buffer: &'a mut [f64],
+) -> MatRef<'a, f64> {
+    let width = columns.len();
+    for (row, part) in buffer.chunks_exact_mut(width).enumerate() {
+        rows.copy(row, columns.clone(), part);
+        part.iter_mut()
+            .zip(&mean[columns.clone()])
+            .for_each(|(z, mean)| *z -= mean);
+    }
+    MatRef::from_column_major_slice(buffer, width, rows.rows())
+}
+
+/// Two parts of `length` numbers each.
+fn buffer_pair(buffer: &mut Vec<f64>, length: usize) -> (&mut [f64], &mut [f64]) {
+    buffer.resize(2 * length, 0.0);
+    buffer.split_at_mut(length)
+}
+
+/// Adds A^T A to the lower half of `sum`.
+fn add_gram(panel: MatRef<'_, f64>, sum: MatMut<'_, f64>) {
+    triangular::matmul(
+        sum,
+        BlockStructure::TriangularLower,
+        Accum::Add,
+        panel.transpose(),
+        BlockStructure::Rectangular,
+        panel,
+        BlockStructure::Rectangular,
+        1.0,
+        Par::Seq,
+    );
+}
+
+/// One round of W = H R: H replaces W.
+fn orthonormalise(mut h: MatMut<'_, f64>, task: &Task) -> Result<(), PcaError> {
+    let (d, m) = (h.nrows(), h.ncols());
+    let panels = Panels::of(m, d, 0);
+    let gram = panels.sum(task, m, m, |columns, sum, _| {
+        add_gram(h.as_ref().get(columns, ..), sum);
+    })?;
+    let lower = symmetric::cholesky(gram);
+    panels.each(h.as_mut(), task, |_, part, _| {
+        solve_lower_triangular_in_place(lower.as_ref(), part.transpose_mut(), Par::Seq);
+    })
+}
+
+/// The largest entry of each column of X becomes positive.
+fn fix_signs(mut h: MatMut<'_, f64>, mut x: MatMut<'_, f64>) {
+    for j in 0..x.ncols() {
+        let column = (0..x.nrows()).map(|i| x[(i, j)]);
+        let largest = column.fold(
+            0.0_f64,
+            |best, x| if x.abs() > best.abs() { x } else { best },
+        );
+        if largest < 0.0 {
+            (0..x.nrows()).for_each(|i| x[(i, j)] = -x[(i, j)]);
+            (0..h.nrows()).for_each(|i| h[(i, j)] = -h[(i, j)]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DMatrix;
+
+    use super::*;
+
+    /// Rows with singular values 1, ratio, ratio^2, .. and `count` modes, plus a common offset.
+    fn graded(n: usize, d: usize, count: usize, ratio: f64, offset: f64) -> Vec<f64> {
+        let mut values = vec![offset; n * d];
+        for mode in 0..count {
+            let size = ratio.powi(mode as i32);
+            for (at, value) in values.iter_mut().enumerate() {
+                let (i, c) = ((at / d) as f64, (at % d) as f64);
+                let time = std::f64::consts::PI * (i + 0.5) / n as f64;
+                let place = 12.9898 * (c + 1.0) * (mode as f64 + 1.0);
+                *value += size * (time * (mode as f64 + 1.0)).cos() * place.sin();
+            }
+        }
+        values
+    }
+
+    fn decompose(values: &[f64], d: usize, modes: usize) -> (Pca, Basis) {
+        let (rows, task) = (Table::new(values, d), Task::default());
+        let pca = Pca::new(&rows, &task).unwrap();
+        let basis = pca.basis(&rows, modes, &task).unwrap();
+        (pca, basis)
+    }
+
+    fn orthonormality(basis: &Basis, d: usize) -> f64 {
+        let h = DMatrix::from_column_slice(d, basis.modes, &basis.vectors);
+        (h.transpose() * &h - DMatrix::identity(basis.modes, basis.modes)).amax()
+    }
+
+    /// ||Y - X H^T|| / ||Y||, from the parts.
+    fn defect(values: &[f64], d: usize, pca: &Pca, basis: &Basis) -> f64 {
+        let m = basis.modes;
+        let error = |at: usize| {
+            let (i, c) = (at / d, at % d);
+            let modes = (0..m).map(|j| basis.coordinates[i * m + j] * basis.vectors[j * d + c]);
+            values[at] - pca.mean()[c] - modes.sum::<f64>()
+        };
+        let squares: f64 = (0..values.len()).map(|at| error(at).powi(2)).sum();
+        squares.sqrt() / pca.spread()
+    }
+
+    #[test]
+    fn agrees_with_a_direct_svd() {
+        let (n, d) = (12, 50);
+        let values = graded(n, d, 6, 0.3, 2.0);
+        let (pca, basis) = decompose(&values, d, 3);
+        let z = DMatrix::from_row_slice(n, d, &values);
+        let mean = z.row_mean();
+        let y = DMatrix::from_fn(n, d, |i, c| z[(i, c)] - mean[c]);
+        let svd = y.svd(true, true);
+        for (j, value) in pca.singular_values().iter().take(6).enumerate() {
+            // eigenvalues of the Gram matrix err by about 1e-15 of the largest
+            let expected = svd.singular_values[j];
+            assert!((value - expected).abs() <= 1e-13 * pca.spread().powi(2) / expected);
+        }
+        let v = svd.v_t.unwrap();
+        for j in 0..3 {
+            let dot: f64 = (0..d).map(|c| v[(j, c)] * basis.vectors[j * d + c]).sum();
+            assert!(dot.abs() > 1.0 - 1e-12, "mode {j}: {dot}");
+        }
+        let left_out: f64 = svd.singular_values.iter().skip(3).map(|s| s * s).sum();
+        assert!((basis.residual - left_out.sqrt()).abs() < 1e-12 * pca.spread());
+        assert!((pca.residual(3) - left_out.sqrt()).abs() < 1e-12 * pca.spread());
+    }
+
+    #[test]
+    fn all_modes_reproduce_every_row_however_fast_they_decay() {
+        for ratio in [0.9, 0.3, 0.03] {
+            for (scale, offset) in [(1.0, 0.0), (1e8, 0.0), (1e-8, 0.0), (1.0, 100.0)] {
+                let (n, d) = (20, 90);
+                let mut values = graded(n, d, 19, ratio, offset);
+                values.iter_mut().for_each(|z| *z *= scale);
+                let (pca, basis) = decompose(&values, d, n - 1);
+                // the QR's bound is rounding; the rank cut adds 1e-13 a mode
+                assert!(orthonormality(&basis, d) < 1e-13, "ratio {ratio}");
+                assert!(defect(&values, d, &pca, &basis) < 1e-11, "ratio {ratio}");
+                assert!(basis.residual < 1e-11 * pca.spread());
+            }
+        }
+    }
+
+    #[test]
+    fn rank_is_found_and_modes_above_it_are_not_made() {
+        for (rank, ratio) in [(1, 1.0), (3, 0.1), (3, 1e-4), (2, 1e-10)] {
+            let (n, d) = (10, 60);
+            let values = graded(n, d, rank, ratio, 0.0);
+            let (pca, basis) = decompose(&values, d, n - 1);
+            assert_eq!((basis.rank, basis.modes), (rank, rank), "ratio {ratio}");
+            assert!(orthonormality(&basis, d) < 1e-13);
+            assert!(defect(&values, d, &pca, &basis) < 1e-12);
+        }
+    }
+
+    #[test]
+    fn rows_that_do_not_differ_have_no_modes() {
+        for n in [1, 2, 7] {
+            let values: Vec<f64> = (0..n * 30).map(|at| (at % 30) as f64 * 0.1).collect();
+            let (pca, basis) = decompose(&values, 30, n - 1);
+            assert_eq!((pca.spread(), basis.rank, basis.modes), (0.0, 0, 0));
+            assert_eq!(basis.residual, 0.0);
+            assert!(basis.coordinates.is_empty());
+        }
+    }
+
+    #[test]
+    fn the_largest_entry_of_each_coordinate_is_positive() {
+        let (_, basis) = decompose(&graded(9, 40, 5, 0.5, 0.0), 40, 5);
+        for j in 0..5 {
+            let column = basis.coordinates.iter().skip(j).step_by(5);
+            let largest = column.fold(0.0_f64, |a, &x| if x.abs() > a.abs() { x } else { a });
+            assert!(largest > 0.0);
+        }
+    }
+
+    #[test]
+    fn reduced_rows_keep_distances() {
+        let (n, d) = (15, 80);
+        let values = graded(n, d, 8, 0.4, 1.0);
+        let pca = Pca::new(&Table::new(&values, d), &Task::default()).unwrap();
+        let reduced = pca.reduced();
+        let distance = |values: &[f64], d: usize, i: usize, j: usize| {
+            let pairs = values[i * d..(i + 1) * d].iter().zip(&values[j * d..]);
+            pairs.map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
+        };
+        for (i, j) in [(0, 1), (3, 14), (7, 8)] {
+            let difference = distance(&values, d, i, j) - distance(&reduced, n, i, j);
+            // the root of the Gram matrix's rounding
+            assert!(difference.abs() < 1e-8 * pca.spread());
+        }
+    }
+
+    #[test]
+    fn the_number_of_threads_does_not_show() {
+        let (n, d) = (7, 70_000);
+        let values = graded(n, d, 6, 0.2, 3.0);
+        let run = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+            let (pca, basis) = pool.unwrap().install(|| decompose(&values, d, 6));
+            (pca.mean, pca.singular, basis)
+        };
+        assert_eq!(run(1), run(2));
+    }
+
+    #[test]
+    fn cancelled_work_and_infinite_numbers_are_errors() {
+        let task = Task::default();
+        let values = [1.0, f64::INFINITY, 0.0, 1.0];
+        let error = Pca::new(&Table::new(&values, 2), &task).unwrap_err();
+        assert_eq!(error, PcaError::NotFinite);
+        task.cancel();
+        let error = Pca::new(&Table::new(&[1.0, 2.0], 1), &task).unwrap_err();
+        assert_eq!(error, PcaError::Cancelled);
+    }
+}
