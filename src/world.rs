@@ -39,6 +39,13 @@ pub trait World: Send + Sync {
     /// A folder on the way cannot be searched.
     fn identity(&self, path: &Path) -> Result<Option<Identity>>;
 
+    /// The absolute path of `path` with all links followed and no `..`, as far as it exists; what does
+    /// not exist yet is appended as it is written.
+    ///
+    /// # Errors
+    /// A folder on the way cannot be searched, or what does not exist climbs with `..`.
+    fn resolve(&self, path: &Path) -> Result<PathBuf>;
+
     /// A place to write files that will become `out`, or files inside of it. Missing folders above are
     /// created, and removed again if the stage is dropped.
     ///
@@ -80,6 +87,15 @@ pub trait Stage: Send + Sync {
     /// # Errors
     /// A move or a removal fails; what was moved before stays.
     fn commit(self: Box<Self>, moves: &[(String, PathBuf)], removals: &[PathBuf]) -> Result<()>;
+}
+
+/// Bytes that outlive the process, found by name. Losing any of them only costs time, so nothing fails.
+pub trait Store: Send + Sync {
+    /// The bytes kept under `name`, whole or not at all.
+    fn load(&self, name: &str) -> Option<Vec<u8>>;
+
+    /// Keeps `bytes` under `name`, a plain file name.
+    fn keep(&self, name: &str, bytes: &[u8]);
 }
 
 /// One entry of a folder.
@@ -253,6 +269,10 @@ impl World for MemoryWorld {
             modified: None,
             node: None,
         }))
+    }
+
+    fn resolve(&self, path: &Path) -> Result<PathBuf> {
+        Ok(Path::new("/").join(plain(path)))
     }
 
     fn stage(&self, _out: &Path) -> Result<Box<dyn Stage>> {

@@ -49,9 +49,42 @@ impl World for Disk {
         }
     }
 
+    fn resolve(&self, path: &Path) -> Result<PathBuf> {
+        let absolute = std::path::absolute(path).map_err(|error| failure(path, "read", &error))?;
+        for above in absolute.ancestors() {
+            match fs::canonicalize(above) {
+                Ok(real) => return beyond(path, real, &absolute, above),
+                Err(error) if absent(&error) => {}
+                Err(error) => return Err(failure(path, "read", &error)),
+            }
+        }
+        Ok(absolute)
+    }
+
     fn stage(&self, out: &Path) -> Result<Box<dyn Stage>> {
         Ok(Box::new(DiskStage::new(out)?))
     }
+}
+
+/// `real`, which is `above` with its links followed, and the rest of `absolute`, which does not exist.
+fn beyond(path: &Path, real: PathBuf, absolute: &Path, above: &Path) -> Result<PathBuf> {
+    let rest = absolute.strip_prefix(above).unwrap_or(Path::new(""));
+    let climbs = rest
+        .components()
+        .any(|part| !matches!(part, std::path::Component::Normal(_)));
+    // A link whose target is missing would be followed once the target is there.
+    let dangling = rest
+        .components()
+        .next()
+        .is_some_and(|next| fs::symlink_metadata(above.join(next)).is_ok());
+    if climbs || dangling {
+        return Err(failure(path, "resolve", &io::ErrorKind::NotFound.into()));
+    }
+    Ok(if rest.as_os_str().is_empty() {
+        real
+    } else {
+        real.join(rest)
+    })
 }
 
 fn absent(error: &io::Error) -> bool {
@@ -222,6 +255,20 @@ impl Drop for DiskStage {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn paths_are_resolved_through_links_and_dots() {
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path().canonicalize().unwrap();
+        fs::create_dir(root.join("in")).unwrap();
+        std::os::unix::fs::symlink(&root, root.join("in/out")).unwrap();
+        std::os::unix::fs::symlink(root.join("nowhere"), root.join("in/dangling")).unwrap();
+        let resolve = |path: &str| Disk.resolve(&root.join(path)).ok();
+        assert_eq!(resolve("in/../new/file"), Some(root.join("new/file")));
+        assert_eq!(resolve("in/out/new"), Some(root.join("new")));
+        assert_eq!(resolve("new/../../etc"), None);
+        assert_eq!(resolve("in/dangling"), None);
+    }
 
     fn names(folder: &Path) -> Vec<String> {
         let listed = Disk.list(folder).unwrap().into_iter();

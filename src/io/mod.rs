@@ -1,5 +1,9 @@
 //! The disk: [`crate::world::World`] on std::fs, whole files by rename.
 
+mod cache;
 mod disk;
+mod watch;
 
+pub use cache::Cache;
 pub use disk::Disk;
+pub use watch::{Depth, Wake, Watch};

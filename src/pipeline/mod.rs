@@ -2,12 +2,16 @@
 
 mod frames;
 mod input;
+mod key;
 mod lanes;
+mod memory;
 mod open;
 mod output;
 mod save;
 
 pub use input::{FrameRange, InputSpec};
+pub use key::{Key, KeyBuilder};
+pub use memory::{Made, Memory, Remembered};
 pub use open::{Capture, Content, Origin, open};
 pub use output::{Output, Plan, plan};
 pub use save::{Saved, save};
