@@ -1,6 +1,8 @@
 //! Numerics that have never heard of a mesh. Deterministic: the same bits on any number of threads.
 
 pub mod b_spline;
+pub mod banded;
+pub mod cubic_spline;
 pub mod growing_qr;
 pub mod layout;
 pub mod least_squares;
