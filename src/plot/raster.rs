@@ -1,13 +1,13 @@
 //! A scene as pixels, by tiny-skia.
 
 use tiny_skia::{
-    FillRule, FilterQuality, IntSize, LineCap, LineJoin, Mask, Paint, PathBuilder, Pixmap,
-    PixmapPaint, StrokeDash, Transform,
+    FillRule, FilterQuality, GradientStop, IntSize, LineCap, LineJoin, LinearGradient, Mask, Paint,
+    PathBuilder, Pixmap, PixmapPaint, SpreadMode, StrokeDash, Transform,
 };
 
 use super::image::Image;
 use super::scene::{Color, Item, Label, Path, Point, Rect, Scene, Segment, Stroke, runs};
-use super::text;
+use super::{stamp, text};
 
 /// The largest side of an image in pixels: a mistaken size costs at most a gigabyte, not a crash.
 const MAX_SIDE: f32 = 16384.0;
@@ -22,7 +22,8 @@ pub fn raster(scene: &Scene, scale: f32) -> Image {
     };
     let mut canvas = Canvas {
         pixmap,
-        transform: Transform::from_scale(scale, scale),
+        scale,
+        clip: Rect::new(0.0, 0.0, width as f32, height as f32),
         mask: None,
     };
     canvas.pixmap.fill(skia(scene.background));
@@ -44,67 +45,112 @@ fn blank(width: u32, height: u32) -> Image {
 
 struct Canvas {
     pixmap: Pixmap,
-    transform: Transform,
+    scale: f32,
+    /// In pixels of the image.
+    clip: Rect,
     mask: Option<Mask>,
 }
 
 impl Canvas {
     fn draw(&mut self, item: &Item) {
         match item {
-            Item::Path { path, fill, stroke } => {
-                if let Some(path) = built(path) {
-                    self.paint(&path, *fill, *stroke);
+            Item::Path { path, fill, stroke } => match (upright(path), fill, stroke) {
+                (Some(ends), None, Some(stroke)) if stroke.dash.is_none() => {
+                    self.upright(ends, *stroke);
                 }
-            }
+                _ => self.path(path, *fill, *stroke),
+            },
             Item::Circle {
                 centre,
                 radius,
                 fill,
                 stroke,
-            } => {
-                let circle = PathBuilder::from_circle(centre[0], centre[1], *radius);
-                if let Some(path) = circle {
-                    self.paint(&path, *fill, *stroke);
-                }
-            }
+            } => self.circle(*centre, *radius, *fill, *stroke),
             Item::Curve {
                 points,
                 colors,
                 width,
-            } => self.curve(points, colors, *width),
+            } => {
+                for (color, run) in runs(points, colors) {
+                    let stroke = Stroke::new(color, *width);
+                    self.path(&Path::polyline(run), None, Some(stroke));
+                }
+            }
+            Item::Ramp { rect, colors } => self.ramp(*rect, colors),
             Item::Text(label) => self.text(label),
             Item::Picture { rect, image } => self.picture(*rect, image),
-            Item::Clip(rect) => self.clip(*rect),
+            Item::Clip(rect) => self.set_clip(*rect),
         }
+    }
+
+    fn path(&mut self, path: &Path, fill: Option<Color>, stroke: Option<Stroke>) {
+        if let Some(path) = built(path) {
+            self.paint(&path, fill, stroke);
+        }
+    }
+
+    fn circle(&mut self, at: Point, radius: f32, fill: Option<Color>, stroke: Option<Stroke>) {
+        let centre = at.map(|value| value * self.scale);
+        let finite = centre.iter().all(|value| value.is_finite()) && radius.is_finite();
+        if !finite || radius <= 0.0 {
+            return;
+        }
+        let radius = radius * self.scale;
+        if let Some(color) = fill {
+            stamp::ring(&mut self.pixmap, self.clip, centre, [0.0, radius], color);
+        }
+        if let Some(stroke) = stroke {
+            let half = 0.5 * stroke.width * self.scale;
+            let radii = [(radius - half).max(0.0), radius + half];
+            stamp::ring(&mut self.pixmap, self.clip, centre, radii, stroke.color);
+        }
+    }
+
+    /// A line along an axis: the bar about it.
+    fn upright(&mut self, [a, b]: [Point; 2], stroke: Stroke) {
+        let (left, top) = (a[0].min(b[0]), a[1].min(b[1]));
+        let line = Rect::new(left, top, (a[0] - b[0]).abs(), (a[1] - b[1]).abs());
+        let bar = line.grown(0.5 * stroke.width).scaled(self.scale);
+        stamp::bar(&mut self.pixmap, self.clip, bar, stroke.color);
     }
 
     fn paint(&mut self, path: &tiny_skia::Path, fill: Option<Color>, stroke: Option<Stroke>) {
+        let (scale, mask) = (
+            Transform::from_scale(self.scale, self.scale),
+            self.mask.as_ref(),
+        );
         if let Some(color) = fill {
-            self.pixmap.fill_path(
-                path,
-                &paint(color),
-                FillRule::Winding,
-                self.transform,
-                self.mask.as_ref(),
-            );
+            let rule = FillRule::Winding;
+            self.pixmap
+                .fill_path(path, &paint(color), rule, scale, mask);
         }
         if let Some(stroke) = stroke {
-            self.pixmap.stroke_path(
-                path,
-                &paint(stroke.color),
-                &pen(stroke),
-                self.transform,
-                self.mask.as_ref(),
-            );
+            let (paint, pen) = (paint(stroke.color), pen(stroke));
+            self.pixmap.stroke_path(path, &paint, &pen, scale, mask);
         }
     }
 
-    fn curve(&mut self, points: &[Point], colors: &[Color], width: f32) {
-        for (color, run) in runs(points, colors) {
-            if let Some(path) = built(&Path::polyline(run)) {
-                self.paint(&path, None, Some(Stroke::new(color, width)));
-            }
-        }
+    fn ramp(&mut self, rect: Rect, colors: &[Color]) {
+        let last = colors.len().saturating_sub(1).max(1) as f32;
+        let stops = colors.iter().enumerate();
+        let stops = stops.map(|(i, &color)| GradientStop::new(i as f32 / last, skia(color)));
+        let ends = [rect.bottom(), rect.top].map(|y| tiny_skia::Point::from_xy(rect.left, y));
+        let identity = Transform::identity();
+        let shader =
+            LinearGradient::new(ends[0], ends[1], stops.collect(), SpreadMode::Pad, identity);
+        let (Some(shader), Some(path)) = (shader, built(&Path::rect(rect))) else {
+            return;
+        };
+        let paint = Paint {
+            shader,
+            ..Paint::default()
+        };
+        let (scale, mask) = (
+            Transform::from_scale(self.scale, self.scale),
+            self.mask.as_ref(),
+        );
+        self.pixmap
+            .fill_path(&path, &paint, FillRule::Winding, scale, mask);
     }
 
     fn text(&mut self, label: &Label) {
@@ -131,19 +177,34 @@ impl Canvas {
             quality: FilterQuality::Bilinear,
             ..PixmapPaint::default()
         };
-        let transform = place.post_concat(self.transform);
+        let transform = place.post_scale(self.scale, self.scale);
         let mask = self.mask.as_ref();
         self.pixmap
             .draw_pixmap(0, 0, pixels.as_ref(), &quality, transform, mask);
     }
 
-    fn clip(&mut self, rect: Option<Rect>) {
-        self.mask = rect.and_then(|rect| {
-            let mut mask = Mask::new(self.pixmap.width(), self.pixmap.height())?;
-            let path = built(&Path::rect(rect))?;
-            mask.fill_path(&path, FillRule::Winding, true, self.transform);
+    /// Limits what follows to whole pixels about `rect`.
+    fn set_clip(&mut self, rect: Option<Rect>) {
+        let (width, height) = (self.pixmap.width(), self.pixmap.height());
+        let whole = Rect::new(0.0, 0.0, width as f32, height as f32);
+        self.clip = rect.map_or(whole, |rect| rect.scaled(self.scale));
+        self.mask = rect.and_then(|_| {
+            let mut mask = Mask::new(width, height)?;
+            let path = built(&Path::rect(self.clip))?;
+            mask.fill_path(&path, FillRule::Winding, false, Transform::identity());
             Some(mask)
         });
+    }
+}
+
+/// The ends of a path that is one line along an axis.
+fn upright(path: &Path) -> Option<[Point; 2]> {
+    match path.0[..] {
+        [Segment::Move(a), Segment::Line(b)] if a[0] == b[0] || a[1] == b[1] => {
+            let finite = [a, b].iter().flatten().all(|value| value.is_finite());
+            finite.then_some([a, b])
+        }
+        _ => None,
     }
 }
 

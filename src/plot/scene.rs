@@ -82,6 +82,16 @@ impl Rect {
     }
 }
 
+impl Rect {
+    /// All lengths times `scale`.
+    #[must_use]
+    pub(super) fn scaled(&self, scale: f32) -> Self {
+        let [left, top, width, height] =
+            [self.left, self.top, self.width, self.height].map(|length| length * scale);
+        Rect::new(left, top, width, height)
+    }
+}
+
 /// One step of a [`Path`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Segment {
@@ -219,6 +229,14 @@ pub enum Item {
         /// Its width in pixels.
         width: f32,
     },
+    /// A rectangle filled with evenly spaced colours that blend into each other, from its foot to its
+    /// top.
+    Ramp {
+        /// Where.
+        rect: Rect,
+        /// At least two.
+        colors: Vec<Color>,
+    },
     /// Text.
     Text(Label),
     /// An image stretched over a rectangle.
@@ -329,7 +347,7 @@ impl Item {
             Item::Circle { centre, .. } => shift(centre, by),
             Item::Curve { points, .. } => points.iter_mut().for_each(|point| shift(point, by)),
             Item::Text(label) => shift(&mut label.at, by),
-            Item::Picture { rect, .. } | Item::Clip(Some(rect)) => {
+            Item::Picture { rect, .. } | Item::Ramp { rect, .. } | Item::Clip(Some(rect)) => {
                 rect.left += by[0];
                 rect.top += by[1];
             }

@@ -30,7 +30,7 @@ pub fn svg(scene: &Scene) -> String {
 #[derive(Default)]
 struct Page {
     text: String,
-    clips: usize,
+    ids: usize,
     clipped: bool,
 }
 
@@ -56,6 +56,7 @@ impl Page {
             } => runs(points, colors).for_each(|(color, run)| {
                 self.path(&Path::polyline(run), None, Some(Stroke::new(color, *width)));
             }),
+            Item::Ramp { rect, colors } => self.ramp(*rect, colors),
             Item::Text(label) => self.label(label),
             Item::Picture { rect, image } => self.picture(*rect, image),
             Item::Clip(rect) => self.clip(*rect),
@@ -74,6 +75,20 @@ impl Page {
         self.line(&format!(r#"<circle cx="{x}" cy="{y}" r="{r}"{look}/>"#));
     }
 
+    fn ramp(&mut self, rect: Rect, colors: &[Color]) {
+        self.ids += 1;
+        let (id, place) = (self.ids, place(rect));
+        let last = colors.len().saturating_sub(1).max(1) as f32;
+        let stops = colors.iter().enumerate().map(|(i, &color)| {
+            let color = painted("stop-color", color);
+            format!(r#"<stop offset="{:.4}"{color}/>"#, i as f32 / last)
+        });
+        let stops: String = stops.collect();
+        self.line(&format!(
+            r##"<linearGradient id="id{id}" x1="0" y1="1" x2="0" y2="0">{stops}</linearGradient><rect {place} fill="url(#id{id})"/>"##
+        ));
+    }
+
     fn label(&mut self, label: &Label) {
         let ([x, y], size) = (label.at.map(number), number(label.size));
         let width = number(text_width(&label.text, label.size));
@@ -87,8 +102,8 @@ impl Page {
             let _ = write!(more, r#" transform="rotate(-90 {x} {y})""#);
         }
         if let Some(halo) = label.halo {
-            more += &stroke_of(Stroke::new(halo, label.size / 4.0));
-            more += r#" paint-order="stroke""#;
+            more.push_str(&stroke_of(Stroke::new(halo, label.size / 4.0)));
+            more.push_str(r#" paint-order="stroke""#);
         }
         let text = escaped(&label.text);
         self.line(&format!(
@@ -113,11 +128,11 @@ impl Page {
             self.line("</g>");
         }
         if let Some(rect) = rect {
-            self.clips += 1;
+            self.ids += 1;
             self.clipped = true;
-            let (id, place) = (self.clips, place(rect));
+            let (id, place) = (self.ids, place(rect));
             self.line(&format!(
-                r##"<clipPath id="clip{id}"><rect {place}/></clipPath><g clip-path="url(#clip{id})">"##
+                r##"<clipPath id="id{id}"><rect {place}/></clipPath><g clip-path="url(#id{id})">"##
             ));
         }
     }
@@ -160,7 +175,8 @@ fn data(path: &Path) -> String {
 }
 
 fn look(fill_color: Option<Color>, stroke: Option<Stroke>) -> String {
-    fill(fill_color) + &stroke.map(stroke_of).unwrap_or_default()
+    let line = stroke.map(stroke_of).unwrap_or_default();
+    format!("{}{line}", fill(fill_color))
 }
 
 fn fill(color: Option<Color>) -> String {
@@ -188,7 +204,10 @@ fn painted(what: &str, color: Color) -> String {
     let [r, g, b, a] = color.0;
     let mut text = format!(r##" {what}="#{r:02x}{g:02x}{b:02x}""##);
     if a < 255 {
-        let opacity = number(f32::from(a) / 255.0);
+        let (opacity, what) = (
+            number(f32::from(a) / 255.0),
+            what.trim_end_matches("-color"),
+        );
         let _ = write!(text, r#" {what}-opacity="{opacity}""#);
     }
     text
@@ -223,6 +242,10 @@ mod tests {
         scene.clipped(Rect::new(5.0, 5.0, 50.0, 40.0), |scene| {
             scene.line([0.0, 0.0], [1.0 / 3.0, f32::NAN], line.dashed(3.0, 2.0));
             scene.ring([20.0, 20.0], 4.0, None, line);
+        });
+        scene.items.push(Item::Ramp {
+            rect: Rect::new(90.0, 0.0, 5.0, 50.0),
+            colors: vec![Color::hex(0), Color::hex(0xff0000).with_alpha(0.5)],
         });
         scene.items.push(Item::Picture {
             rect: Rect::new(60.0, 10.0, 20.0, 20.0),

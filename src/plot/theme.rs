@@ -23,6 +23,17 @@ pub struct Theme {
     pub text: f32,
 }
 
+/// A colour by its role, whatever the theme.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Tint {
+    /// As text.
+    Ink,
+    /// As secondary text.
+    Muted,
+    /// The n-th of the colours that tell series apart, counted from 0 and around.
+    Series(usize),
+}
+
 /// How many colours the time map is divided into: fewer strokes, and no step that could be seen.
 const TIME_STEPS: f64 = 64.0;
 
@@ -35,7 +46,7 @@ impl Theme {
             muted: Color::hex(0x595959),
             grid: Color::hex(0xe6e6e6),
             series: [0x0072b2, 0xd55e00, 0x009e73, 0xcc79a7, 0xe69f00, 0x56b4e9].map(Color::hex),
-            time: [0.0, 0.8],
+            time: [0.0, 0.77],
             text: 12.0,
         }
     }
@@ -58,6 +69,15 @@ impl Theme {
     pub fn with_text(mut self, size: f32) -> Self {
         self.text = size.max(0.0);
         self
+    }
+
+    /// The colour of that role.
+    pub fn tint(&self, tint: Tint) -> Color {
+        match tint {
+            Tint::Ink => self.ink,
+            Tint::Muted => self.muted,
+            Tint::Series(i) => self.series[i % self.series.len()],
+        }
     }
 
     /// The colour of time at `share` in \[0, 1\] of the whole; outside it the ends' colours.

@@ -1,0 +1,562 @@
+//! The pose space as a map: the time signal's curve coloured by time, the frames on it, sites, control
+//! points and pins. Both axes have the same unit, for distances in the map are distances of shapes.
+
+use std::sync::Arc;
+
+use super::axes::{Axis, Plane, Ticks, bottom_margin, nice_step, range_of, with_margin};
+use super::labels::Labels;
+use super::legend::{Legend, Mark, arrow};
+use super::scene::{Path, Point, Rect, Scene, Stroke};
+use super::text::CAP_HEIGHT;
+use super::theme::Theme;
+use super::{Anchor, Image, Item, Scale};
+
+/// What the map shows; any of the lists may be empty. Points that are not finite are left out.
+#[derive(Debug, Clone, Default)]
+pub struct PoseSpace {
+    /// Points f(t) along the curve, dense enough to look smooth.
+    pub curve: Vec<[f64; 2]>,
+    /// The times t of these points in frames, growing; as many as points.
+    pub times: Vec<f64>,
+    /// Positions p_i of the frames 1, 2, ..
+    pub frames: Vec<[f64; 2]>,
+    /// Where the curve passes the frames, f(i); drawn as a link from p_i where they differ visibly.
+    pub reached: Vec<[f64; 2]>,
+    /// Sites s_j of the pose signal.
+    pub sites: Vec<[f64; 2]>,
+    /// Control points f_j of the time signal, in order.
+    pub controls: Vec<[f64; 2]>,
+    /// Pinned frames, from 1, and their places.
+    pub pins: Vec<(usize, [f64; 2])>,
+    /// Frames, from 1, that are numbered before all others and drawn larger.
+    pub shown: Vec<usize>,
+    /// Small pictures behind the curve: where their middles lie, and how wide they are in data units.
+    pub pictures: Vec<([f64; 2], f64, Arc<Image>)>,
+    /// Which part of the plane to show: x range, y range. `None` shows everything.
+    pub window: Option<[[f64; 2]; 2]>,
+}
+
+/// Most numbered frames on a map, besides pins and shown frames.
+const MOST_NUMBERS: f64 = 12.0;
+
+/// The map in a picture of `width` x `height` pixels, and where its data lies in it. Without any point
+/// it shows the unit square; a single point lies in the middle. Legend and colour bar stand outside
+/// the data and are left out where there is no room for them.
+pub fn pose_space(map: &PoseSpace, width: f32, height: f32, theme: &Theme) -> (Scene, Plane) {
+    let mut scene = Scene::new(width, height, theme.background);
+    let roomy = width >= 24.0 * theme.text && height >= 18.0 * theme.text;
+    let legend = map.legend(theme, if roomy { width - 2.0 * theme.text } else { 0.0 });
+    let tall = height - legend.height(theme) - bottom_margin(theme) - 1.0;
+    let range = map.time_range().filter(|_| roomy && theme.text > 0.0);
+    let bar = range.map(|range| TimeBar::new(range, tall, theme));
+    let right = bar
+        .as_ref()
+        .map_or(1.2 * theme.text + 1.0, |bar| bar.width(theme));
+    let top = legend.height(theme).max(0.8 * theme.text + 1.0);
+    let room = Rect::new(0.0, top, width - right, height - top);
+    let [x, y] = map.window.unwrap_or_else(|| map.ranges());
+    let (plane, x, y) = Plane::isometric_in(room, x, y, theme);
+    plane.draw_grid(&mut scene, theme, &x, &y);
+    if map.window.is_some() {
+        scene.clipped(plane.area, |scene| map.draw(scene, &plane, theme));
+    } else {
+        map.draw(&mut scene, &plane, theme);
+    }
+    plane.draw_frame(&mut scene, theme);
+    plane.draw_x(&mut scene, theme, &x, "p₁ (layout units)");
+    plane.draw_y(&mut scene, theme, &y, "p₂ (layout units)");
+    legend.draw(&mut scene, theme, plane.area.left);
+    if let Some(bar) = bar {
+        bar.draw(&mut scene, theme, plane.area);
+    }
+    (scene, plane)
+}
+
+impl PoseSpace {
+    fn points(&self) -> impl Iterator<Item = [f64; 2]> + '_ {
+        let pins = self.pins.iter().map(|(_, at)| at);
+        let lists = [&self.curve, &self.frames, &self.sites, &self.controls];
+        let pictures = self.pictures.iter().flat_map(|(at, wide, _)| {
+            let half = 0.5 * wide;
+            [[at[0] - half, at[1] - half], [at[0] + half, at[1] + half]]
+        });
+        lists
+            .into_iter()
+            .flatten()
+            .chain(pins)
+            .copied()
+            .chain(pictures)
+    }
+
+    fn time_range(&self) -> Option<[f64; 2]> {
+        range_of(self.times.iter().copied()).filter(|range| range[0] < range[1])
+    }
+
+    fn legend(&self, theme: &Theme, width: f32) -> Legend {
+        let marks = Marks::of(theme);
+        let entries = [
+            (marks.curve, "f(t)", self.curve.len() > 1),
+            (marks.frame, "frames", !self.frames.is_empty()),
+            (marks.site, "sites", !self.sites.is_empty()),
+            (marks.control, "control points", !self.controls.is_empty()),
+            (marks.pin, "pins", !self.pins.is_empty()),
+            (marks.end, "last frame", self.frames.len() > 1),
+        ];
+        let present = entries.into_iter().filter(|entry| entry.2);
+        let present: Vec<(Mark, &str)> = present.map(|(mark, name, _)| (mark, name)).collect();
+        Legend::new(&present, width, theme)
+    }
+
+    /// Ranges of everything shown, with a margin for marks; equal centres for lone points.
+    fn ranges(&self) -> [[f64; 2]; 2] {
+        let along = |axis: usize| range_of(self.points().map(|point| point[axis]));
+        let (Some(x), Some(y)) = (along(0), along(1)) else {
+            return [[0.0, 1.0]; 2];
+        };
+        with_margin([x, y], 0.06)
+    }
+
+    fn draw(&self, scene: &mut Scene, plane: &Plane, theme: &Theme) {
+        let marks = Marks::of(theme);
+        self.draw_pictures(scene, plane);
+        self.draw_controls(scene, plane, theme);
+        self.draw_curve(scene, plane, theme);
+        self.draw_links(scene, plane, theme);
+        draw_all(scene, plane, theme, marks.site, &self.sites);
+        self.draw_frames(scene, plane, theme);
+        for (_, at) in self.pins.iter().filter(|(_, at)| finite(at)) {
+            marks.pin.draw(scene, theme, plane.pixel(*at));
+        }
+        self.draw_numbers(scene, plane, theme);
+    }
+
+    fn draw_pictures(&self, scene: &mut Scene, plane: &Plane) {
+        for (at, wide, image) in self.pictures.iter().filter(|(at, ..)| finite(at)) {
+            let low = plane.pixel([at[0] - 0.5 * wide, at[1]]);
+            let high = plane.pixel([at[0] + 0.5 * wide, at[1]]);
+            let width = high[0] - low[0];
+            let tall = width * image.height as f32 / image.width.max(1) as f32;
+            scene.items.push(Item::Picture {
+                rect: Rect::new(low[0], low[1] - 0.5 * tall, width, tall),
+                image: image.clone(),
+            });
+        }
+    }
+
+    fn draw_controls(&self, scene: &mut Scene, plane: &Plane, theme: &Theme) {
+        let mark = Marks::of(theme).control;
+        let color = theme.series[1].with_alpha(0.7);
+        let stroke = Stroke::new(color, 0.9 * theme.unit());
+        let corners = pixels(plane, &self.controls);
+        let dashed = stroke.dashed(3.0 * theme.unit(), 2.5 * theme.unit());
+        scene.stroke(Path::polyline(&corners), dashed);
+        corners.iter().for_each(|&at| mark.draw(scene, theme, at));
+    }
+
+    fn draw_curve(&self, scene: &mut Scene, plane: &Plane, theme: &Theme) {
+        let [first, last] = self.time_range().unwrap_or([0.0, 1.0]);
+        let color = |t: f64| theme.time((t - first) / (last - first));
+        let both = self.curve.iter().zip(&self.times);
+        let finite = both.filter(|(at, _)| finite(at));
+        let mut places: Vec<(Point, f64)> = finite.map(|(at, &t)| (plane.pixel(*at), t)).collect();
+        places.dedup_by(|next, kept| distance(next.0, kept.0) < 0.8); // no step that could be seen
+        let points: Vec<Point> = places.iter().map(|(at, _)| *at).collect();
+        let arrows = arrows(&points, theme);
+        scene.items.push(Item::Curve {
+            points,
+            colors: places.iter().map(|(_, t)| color(*t)).collect(),
+            width: 2.2 * theme.unit(),
+        });
+        for (i, at, direction) in arrows {
+            arrow(scene, at, direction, color(places[i].1), theme);
+        }
+    }
+
+    fn draw_links(&self, scene: &mut Scene, plane: &Plane, theme: &Theme) {
+        let stroke = Stroke::new(theme.muted, 0.8 * theme.unit());
+        let pairs = self.frames.iter().zip(&self.reached);
+        for (from, to) in pairs.filter(|(from, to)| finite(from) && finite(to)) {
+            let (from, to) = (plane.pixel(*from), plane.pixel(*to));
+            if (from[0] - to[0]).hypot(from[1] - to[1]) > 1.5 * theme.unit() {
+                scene.line(from, to, stroke);
+            }
+        }
+    }
+
+    fn draw_frames(&self, scene: &mut Scene, plane: &Plane, theme: &Theme) {
+        let marks = Marks::of(theme);
+        self.draw_dots(scene, plane, theme);
+        let shown = self.shown.iter().filter_map(|&frame| self.place(frame));
+        for at in shown {
+            let rim = Stroke::new(theme.background, theme.unit());
+            scene.ring(
+                plane.pixel(at),
+                4.4 * theme.unit(),
+                Some(theme.series[1]),
+                rim,
+            );
+        }
+        if let [_, .., last] = self.frames[..] {
+            draw_all(scene, plane, theme, marks.end, &[last]);
+        }
+    }
+
+    /// A dot each frame, all rims below all dots; smaller where they stand close.
+    fn draw_dots(&self, scene: &mut Scene, plane: &Plane, theme: &Theme) {
+        let (unit, places) = (theme.unit(), pixels(plane, &self.frames));
+        let mut gaps: Vec<f32> = places
+            .windows(2)
+            .map(|pair| distance(pair[0], pair[1]))
+            .collect();
+        gaps.sort_by(f32::total_cmp);
+        let gap = gaps.get(gaps.len() / 2).copied().unwrap_or(f32::INFINITY);
+        let radius = (0.28 * gap).clamp(1.3 * unit, 2.4 * unit);
+        for &at in &places {
+            scene.disc(at, radius + 0.8 * unit, theme.background);
+        }
+        for &at in &places {
+            scene.disc(at, radius, theme.ink);
+        }
+    }
+
+    /// Place of a frame counted from 1.
+    fn place(&self, frame: usize) -> Option<[f64; 2]> {
+        let at = self.frames.get(frame.checked_sub(1)?)?;
+        finite(at).then_some(*at)
+    }
+
+    /// Numbers frames: pins and shown ones, the first and the last, then every few.
+    fn draw_numbers(&self, scene: &mut Scene, plane: &Plane, theme: &Theme) {
+        let unit = theme.unit();
+        let mut obstacles = spaced(pixels(plane, &self.curve), 3.0 * unit);
+        for [x, y] in pixels(plane, &self.frames) {
+            let reach = 3.5 * unit; // a dot is an obstacle of some size
+            let around = [
+                [x - reach, y],
+                [x + reach, y],
+                [x, y - reach],
+                [x, y + reach],
+            ];
+            obstacles.extend(around);
+        }
+        let mut labels = Labels::new(plane.area, obstacles);
+        for frame in self.numbered() {
+            if let Some(at) = self.place(frame) {
+                let place = (plane.pixel(at), 7.5 * unit);
+                labels.write(scene, theme, place, (&frame.to_string(), theme.ink));
+            }
+        }
+    }
+
+    /// Frames to number, the most important first, none twice.
+    fn numbered(&self) -> Vec<usize> {
+        let count = self.frames.len();
+        let step = nice_step((count as f64 / MOST_NUMBERS).max(1.0)) as usize;
+        let pinned = self.pins.iter().map(|(frame, _)| *frame);
+        let ends = [1, count];
+        let every = (step..count).step_by(step.max(1));
+        let all = pinned
+            .chain(self.shown.iter().copied())
+            .chain(ends)
+            .chain(every);
+        let mut order: Vec<usize> = Vec::new();
+        for frame in all {
+            if !order.contains(&frame) {
+                order.push(frame);
+            }
+        }
+        order
+    }
+}
+
+/// The marks of the map.
+struct Marks {
+    curve: Mark,
+    frame: Mark,
+    site: Mark,
+    control: Mark,
+    pin: Mark,
+    end: Mark,
+}
+
+impl Marks {
+    fn of(theme: &Theme) -> Self {
+        Marks {
+            curve: Mark::TimeLine,
+            frame: Mark::Dot(theme.ink),
+            site: Mark::Ring(theme.series[0]),
+            control: Mark::Polygon(theme.series[1]),
+            pin: Mark::Diamond(theme.series[3]),
+            end: Mark::Square(theme.ink),
+        }
+    }
+}
+
+fn finite(point: &[f64; 2]) -> bool {
+    point.iter().all(|value| value.is_finite())
+}
+
+fn pixels(plane: &Plane, points: &[[f64; 2]]) -> Vec<Point> {
+    let finite = points.iter().filter(|point| finite(point));
+    finite.map(|point| plane.pixel(*point)).collect()
+}
+
+fn draw_all(scene: &mut Scene, plane: &Plane, theme: &Theme, mark: Mark, points: &[[f64; 2]]) {
+    let places = pixels(plane, points);
+    if let Mark::Dot(_) = mark {
+        let rim = 3.2 * theme.unit(); // all rims below all dots
+        places
+            .iter()
+            .for_each(|&at| scene.disc(at, rim, theme.background));
+    }
+    places.iter().for_each(|&at| mark.draw(scene, theme, at));
+}
+
+/// Points of a dense row that lie at least `gap` from the last one kept.
+fn spaced(mut points: Vec<Point>, gap: f32) -> Vec<Point> {
+    points.dedup_by(|next, kept| distance(*next, *kept) < gap);
+    points
+}
+
+/// Arrowheads at even distances along a polyline, away from its ends: index of the segment, place,
+/// direction.
+fn arrows(points: &[Point], theme: &Theme) -> Vec<(usize, Point, Point)> {
+    let lengths = points.windows(2).map(|ends| distance(ends[0], ends[1]));
+    let total: f32 = lengths.sum();
+    let spacing = 110.0 * theme.unit();
+    let wanted = (total / spacing).round().min(9.0);
+    let mut found = Vec::new();
+    let mut walked = 0.0;
+    for (i, ends) in points.windows(2).enumerate() {
+        let length = distance(ends[0], ends[1]);
+        let next = (found.len() as f32 + 0.5) * total / wanted;
+        if length > 0.0 && walked + length > next && (found.len() as f32) < wanted {
+            let share = (next - walked) / length;
+            let [dx, dy] = [ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]];
+            let at = [ends[0][0] + share * dx, ends[0][1] + share * dy];
+            found.push((i, at, [dx / length, dy / length]));
+        }
+        walked += length;
+    }
+    found
+}
+
+fn distance(a: Point, b: Point) -> f32 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+/// The colours of time and their numbers, right of the data.
+struct TimeBar {
+    axis: Axis,
+    ticks: Ticks,
+}
+
+impl TimeBar {
+    fn new(range: [f64; 2], height: f32, theme: &Theme) -> Self {
+        let axis = Axis {
+            range,
+            pixels: [height, 0.0],
+            scale: Scale::Linear,
+        };
+        let ticks = axis.fitting(height, 2.6, Some(1.3), theme);
+        TimeBar { axis, ticks }
+    }
+
+    /// Space that it takes beside the data.
+    fn width(&self, theme: &Theme) -> f32 {
+        self.ticks.width(theme.text) + 3.9 * theme.text
+    }
+
+    fn draw(&self, scene: &mut Scene, theme: &Theme, area: Rect) {
+        let size = theme.text;
+        let bar = Rect::new(area.right() + 0.9 * size, area.top, 0.8 * size, area.height);
+        scene.items.push(Item::Ramp {
+            rect: bar,
+            colors: (0..=32).map(|i| theme.time(f64::from(i) / 32.0)).collect(),
+        });
+        let left = bar.right() + 0.35 * size;
+        for tick in &self.ticks.marks {
+            let at = area.top + self.axis.pixel(tick.value) + 0.5 * CAP_HEIGHT * size;
+            scene.write(&tick.text, [left, at], Anchor::Start, theme);
+        }
+        let name = left + self.ticks.width(size) + 1.15 * size;
+        let middle = 0.5 * (bar.top + bar.bottom());
+        scene.write_upward("t (frames)", [name, middle], theme);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A spiral of `count` frames, everything on it.
+    fn spiral(count: usize) -> PoseSpace {
+        let at = |t: f64| [t * t.cos(), t * t.sin() + 100.0];
+        let times: Vec<f64> = (0..=20 * count).map(|i| i as f64 / 20.0).collect();
+        let frames: Vec<[f64; 2]> = (0..count).map(|i| at(i as f64)).collect();
+        PoseSpace {
+            curve: times.iter().map(|&t| at(t)).collect(),
+            times,
+            reached: frames.clone(),
+            sites: frames.iter().step_by(2).copied().collect(),
+            controls: frames.iter().step_by(3).copied().collect(),
+            pins: vec![(2, at(1.0))],
+            frames,
+            ..PoseSpace::default()
+        }
+    }
+
+    fn texts(scene: &Scene) -> impl Iterator<Item = &super::super::Label> {
+        scene.items.iter().filter_map(|item| match item {
+            Item::Text(label) => Some(label),
+            _ => None,
+        })
+    }
+
+    fn circles(scene: &Scene) -> Vec<Point> {
+        let circle = |item: &Item| match item {
+            Item::Circle { centre, .. } => Some(*centre),
+            _ => None,
+        };
+        scene.items.iter().filter_map(circle).collect()
+    }
+
+    #[test]
+    fn frames_lie_where_the_plane_says() {
+        let map = spiral(12);
+        let (scene, plane) = pose_space(&map, 640.0, 400.0, &Theme::light());
+        let circles = circles(&scene);
+        for at in &map.frames {
+            assert!(circles.contains(&plane.pixel(*at)));
+            assert!(plane.area.contains(plane.pixel(*at)));
+        }
+    }
+
+    #[test]
+    fn no_two_texts_meet_and_none_leaves_the_picture() {
+        for (width, height, size) in [
+            (200.0, 150.0, 9.0),
+            (640.0, 400.0, 12.0),
+            (2400.0, 1600.0, 30.0),
+        ] {
+            for count in [5, 24, 204] {
+                let theme = Theme::dark().with_text(size);
+                let (scene, _) = pose_space(&spiral(count), width, height, &theme);
+                let boxes: Vec<Rect> = texts(&scene).map(|label| label.bounds()).collect();
+                for (i, one) in boxes.iter().enumerate() {
+                    assert!(scene.bounds().contains([one.left, one.top]), "{one:?}");
+                    assert!(
+                        scene.bounds().contains([one.right(), one.bottom()]),
+                        "{one:?}"
+                    );
+                    assert!(boxes[..i].iter().all(|other| !other.intersects(one)));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_legend_stands_outside_the_data() {
+        let (scene, plane) = pose_space(&spiral(24), 640.0, 400.0, &Theme::light());
+        let names = [
+            "f(t)",
+            "frames",
+            "sites",
+            "control points",
+            "pins",
+            "last frame",
+        ];
+        for name in names {
+            let label = texts(&scene).find(|label| label.text == name);
+            let bounds = label.map(|label| label.bounds());
+            assert!(
+                bounds.is_some_and(|bounds| !bounds.intersects(&plane.area)),
+                "{name}"
+            );
+        }
+    }
+
+    #[test]
+    fn pins_ends_and_shown_frames_are_numbered_first() {
+        let map = PoseSpace {
+            shown: vec![7, 500, 0],
+            ..spiral(24)
+        };
+        assert_eq!(map.numbered()[..6], [2, 7, 500, 0, 1, 24]);
+        let (scene, _) = pose_space(&map, 640.0, 400.0, &Theme::light());
+        for number in ["2", "7", "24"] {
+            assert!(
+                texts(&scene)
+                    .any(|label| label.text == number && label.color == Theme::light().ink)
+            );
+        }
+        assert!(!texts(&scene).any(|label| label.text == "500"));
+    }
+
+    #[test]
+    fn degenerate_maps_are_drawn() {
+        let still = |count: usize| PoseSpace {
+            frames: vec![[3.0, -2.0]; count],
+            curve: vec![[3.0, -2.0]; 50],
+            times: vec![1.0; 50],
+            ..PoseSpace::default()
+        };
+        let broken = PoseSpace {
+            frames: vec![[f64::NAN, 0.0], [1.0, f64::INFINITY]],
+            controls: vec![[f64::NAN; 2]; 4],
+            pins: vec![(9, [f64::NAN; 2])],
+            ..PoseSpace::default()
+        };
+        for map in [still(1), still(2), broken, PoseSpace::default()] {
+            for (width, height) in [(640.0, 400.0), (1.0, 1.0)] {
+                let (scene, plane) = pose_space(&map, width, height, &Theme::light());
+                assert!(
+                    circles(&scene)
+                        .iter()
+                        .flatten()
+                        .all(|value| value.is_finite())
+                );
+                assert!(
+                    plane
+                        .pixel([3.0, -2.0])
+                        .iter()
+                        .all(|value| value.is_finite())
+                );
+                super::super::raster(&scene, 1.0);
+            }
+        }
+    }
+
+    #[test]
+    fn the_whole_map_is_there_at_any_scale_and_place() {
+        for unit in [1e-8, 1.0, 1e8] {
+            let scaled = |points: &[[f64; 2]]| points.iter().map(|p| p.map(|v| v * unit)).collect();
+            let map = spiral(12);
+            let map = PoseSpace {
+                curve: scaled(&map.curve),
+                frames: scaled(&map.frames),
+                times: map.times,
+                ..PoseSpace::default()
+            };
+            let (_, plane) = pose_space(&map, 640.0, 400.0, &Theme::light());
+            assert!(
+                map.curve
+                    .iter()
+                    .all(|&at| plane.area.contains(plane.pixel(at)))
+            );
+            let (left, right) = (plane.x.pixel(-11.0 * unit), plane.x.pixel(11.0 * unit));
+            assert!(right - left > 0.4 * plane.area.width, "{left} {right}");
+        }
+    }
+
+    #[test]
+    fn a_window_shows_its_part_and_clips_the_rest() {
+        let map = PoseSpace {
+            window: Some([[0.0, 2.0], [100.0, 101.0]]),
+            ..spiral(24)
+        };
+        let (scene, plane) = pose_space(&map, 640.0, 400.0, &Theme::light());
+        assert!(plane.x.range[0] <= 0.0 && plane.x.range[1] >= 2.0);
+        assert!(scene.items.contains(&Item::Clip(Some(plane.area))));
+    }
+}
