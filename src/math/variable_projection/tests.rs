@@ -1,0 +1,179 @@
+use super::*;
+use faer::linalg::solvers::SolveLstsq;
+
+/// Numbers in \[-1, 1\] from a fixed seed.
+pub(crate) fn noise(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+    move || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+}
+
+struct Small {
+    spline: UniformDesign,
+    targets: Mat<f64>,
+    controls: Mat<f64>,
+    sites: Mat<f64>,
+    zero: Mat<f64>,
+    none: Mat<f64>,
+}
+
+/// 31 samples of a closed wave in R^4, 9 control points near a circle, 7 sites beside it.
+fn small() -> Small {
+    let length = 10.0;
+    let times: Vec<f64> = (0..31).map(|i| i as f64 / 3.0).collect();
+    let spline = UniformDesign::new(9, length, &times);
+    let mut random = noise(3);
+    let angle = |i: usize, n: usize| i as f64 / n as f64 * 5.0;
+    let targets = Mat::from_fn(31, 4, |i, c| (angle(i, 31) * (1.0 + c as f64)).sin());
+    let mut around = |n: usize, radius: f64| {
+        Mat::from_fn(n, 2, |i, a| {
+            let angle = angle(i, n);
+            radius * [angle.cos(), angle.sin()][a] + 0.1 * random()
+        })
+    };
+    Small {
+        spline,
+        targets,
+        controls: around(9, 1.0),
+        sites: around(7, 0.9),
+        zero: Mat::zeros(9, 9),
+        none: Mat::zeros(0, 9),
+    }
+}
+
+impl Small {
+    fn problem(&self) -> Problem<'_> {
+        Problem {
+            spline: &self.spline,
+            targets: self.targets.as_ref(),
+            anchor: self.controls.as_ref(),
+            hold: self.zero.as_ref(),
+            bending: self.zero.as_ref(),
+            fixed: self.none.as_ref(),
+            site_hold: 0.0,
+        }
+    }
+
+    /// Squared residual with control points and sites moved by `step` (in the order of H).
+    fn value(&self, step: &[f64], ridge: f64) -> f64 {
+        let (k, l) = (9, 7);
+        let controls = Mat::from_fn(k, 2, |i, a| self.controls[(i, a)] + step[a * k + i]);
+        let sites = Mat::from_fn(l, 2, |j, a| self.sites[(j, a)] + step[2 * k + a * l + j]);
+        let mut design = Design::new(31, l, 4, ridge);
+        let points = self.spline.apply(controls.as_ref());
+        design.solve(points.as_ref(), sites.as_ref(), self.targets.as_ref())
+    }
+}
+
+#[test]
+fn the_gradient_is_the_derivative_of_the_projected_residual() {
+    let small = small();
+    let mut state = State::new(
+        &small.problem(),
+        small.controls.as_ref(),
+        small.sites.as_ref(),
+        0.0,
+    );
+    let mut normal = Normal::new(&small.spline, 7, 4);
+    state.linearise(&small.problem(), &mut normal);
+    let scale = normal
+        .descent
+        .iter()
+        .fold(0.0f64, |max, x| max.max(x.abs()));
+    for unknown in 0..32 {
+        let h = 1e-5;
+        let mut step = vec![0.0; 32];
+        step[unknown] = h;
+        let ahead = small.value(&step, 0.0);
+        step[unknown] = -h;
+        let behind = small.value(&step, 0.0);
+        let difference = -0.25 * (ahead - behind) / h;
+        // Central differences: h^2 of truncation, 1e-16 / h of rounding.
+        assert!(
+            (difference - normal.descent[unknown]).abs() < 1e-7 * scale,
+            "{unknown}: {difference} against {}",
+            normal.descent[unknown]
+        );
+    }
+}
+
+/// Kaufman's Jacobian -M D v column by column: differences of the plate with its coefficients kept,
+/// except for what the side conditions at moved sites take from them.
+#[test]
+fn the_hessian_is_that_of_the_explicit_jacobian() {
+    let small = small();
+    let problem = small.problem();
+    let mut state = State::new(&problem, small.controls.as_ref(), small.sites.as_ref(), 0.0);
+    let mut normal = Normal::new(&small.spline, 7, 4);
+    state.linearise(&problem, &mut normal);
+    let mut basis = Mat::zeros(31 + 7, 7);
+    state.design.orthonormal(&mut basis);
+    let basis = basis.as_ref().subrows(0, 31).to_owned();
+    let (k, l, m) = (9, 7, 4);
+    let mut jacobian = Mat::<f64>::zeros(31 * m, 2 * (k + l));
+    for unknown in 0..2 * (k + l) {
+        let moved = |h: f64| {
+            let mut controls = small.controls.clone();
+            let mut plate = state.plate.clone();
+            if unknown < 2 * k {
+                controls[(unknown % k, unknown / k)] += h;
+            } else {
+                plate.sites[((unknown - 2 * k) % l, (unknown - 2 * k) / l)] += h;
+                let sides = Mat::from_fn(l, 3, |j, c| match c {
+                    0 => 1.0,
+                    c => plate.sites[(j, c - 1)],
+                });
+                let broken = sides.qr().solve_lstsq(&plate.weights);
+                plate.weights -= &sides * broken;
+            }
+            plate.at(small.spline.apply(controls.as_ref()).as_ref())
+        };
+        let column = (moved(1e-6) - moved(-1e-6)) * faer::Scale(0.5e6);
+        let free = &column - &basis * (basis.transpose() * &column);
+        for c in 0..m {
+            for i in 0..31 {
+                jacobian[(c * 31 + i, unknown)] = free[(i, c)];
+            }
+        }
+    }
+    let mut expected = jacobian.transpose() * &jacobian;
+    let scale = expected.norm_max();
+    expected -= &normal.hessian;
+    // Central differences with h = 1e-6: 1e-10 of rounding, squared sums of 124 terms.
+    assert!(expected.norm_max() < 1e-7 * scale);
+}
+
+#[test]
+fn refinement_decreases_and_keeps_fixed_points() {
+    let small = small();
+    let fixed = Mat::from_fn(1, 9, |_, j| {
+        let (first, weights) = small.spline.row(12);
+        j.checked_sub(first)
+            .and_then(|a| weights.get(a))
+            .copied()
+            .unwrap_or(0.0)
+    });
+    let problem = Problem {
+        fixed: fixed.as_ref(),
+        ..small.problem()
+    };
+    let before = small.spline.apply(small.controls.as_ref());
+    let refined = refine(
+        &problem,
+        small.controls.as_ref(),
+        small.sites.as_ref(),
+        &Options::default(),
+        &Task::default(),
+    )
+    .unwrap();
+    assert!(refined.history.is_sorted_by(|a, b| a > b));
+    assert!(refined.history.last().unwrap() < &(0.2 * refined.history[0]));
+    let after = small.spline.apply(refined.controls.as_ref());
+    for a in 0..2 {
+        assert!((after[(12, a)] - before[(12, a)]).abs() < 1e-10);
+    }
+}
