@@ -285,3 +285,84 @@ fn a_full_stdout_is_an_error() {
         run.stderr
     );
 }
+
+#[cfg(unix)]
+mod interruption {
+    use std::path::Path;
+    use std::process::{Child, Command};
+    use std::time::Duration;
+
+    use super::*;
+    use support::{Run, everything};
+
+    /// Starts the binary, waits until `ready`, sends it `signal`, and waits for its end.
+    fn interrupted(folder: &Path, args: &str, signal: &str, ready: impl Fn(u32) -> bool) -> Run {
+        let mut command = command(folder, args.split_whitespace());
+        let piped = command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child: Child = piped.spawn().unwrap();
+        while !ready(child.id()) && child.try_wait().unwrap().is_none() {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        let id = child.id().to_string();
+        Command::new("kill").args([signal, &id]).status().unwrap();
+        Run::of(child.wait_with_output().unwrap())
+    }
+
+    /// Whether the process catches signals by now, where the system tells; else it is given time.
+    fn listens(process: u32) -> bool {
+        let Ok(status) = fs::read_to_string(format!("/proc/{process}/status")) else {
+            std::thread::sleep(Duration::from_secs(1));
+            return true;
+        };
+        let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
+        let caught = caught.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+        let all = 1 | 1 << 1 | 1 << 14; // SIGHUP, SIGINT, SIGTERM
+        caught.is_some_and(|mask| mask & all == all)
+    }
+
+    #[test]
+    fn work_that_hangs_in_a_read_is_ended_all_the_same() {
+        let folder = tempdir().unwrap();
+        let input = folder.path().join("sheet");
+        sheet(4, 2).write_objs(&input);
+        let pipe = input.join("frame_0003.obj");
+        assert!(
+            Command::new("mkfifo")
+                .arg(&pipe)
+                .status()
+                .unwrap()
+                .success()
+        );
+        for signal in ["-INT", "-TERM", "-HUP"] {
+            // Nobody writes to the pipe: the read does not return.
+            let args = "convert sheet -o out --json";
+            let run = interrupted(folder.path(), args, signal, listens);
+            assert_eq!(run.code, Some(1), "{signal}: {}", run.stderr);
+            assert_eq!(run.stderr, "interrupted\n");
+            assert_eq!(run.object()["error"]["severity"], "cancelled");
+            assert!(!folder.path().join("out").exists());
+        }
+    }
+
+    #[test]
+    fn staged_files_go_and_old_outputs_stay() {
+        let folder = tempdir().unwrap();
+        let out = folder.path().join("out");
+        sheet(30, 120).write_objs(&folder.path().join("sheet"));
+        sheet(3, 2).write_objs(&out);
+        let before = everything(&out);
+        let staging = |_| {
+            let mut names = fs::read_dir(folder.path()).unwrap();
+            names.any(|name| name.unwrap().file_name().to_string_lossy().starts_with('.'))
+        };
+        let run = interrupted(folder.path(), "convert sheet -o out", "-INT", staging);
+        if run.code == Some(0) {
+            // Faster than the signal: then everything is there.
+            assert_eq!(fs::read_dir(&out).unwrap().count(), 120);
+        } else {
+            assert_eq!((run.code, run.stderr.as_str()), (Some(1), "interrupted\n"));
+            assert_eq!(everything(&out), before);
+        }
+        assert!(!staging(0), "nothing hidden is left");
+    }
+}

@@ -13,7 +13,7 @@ use super::print::{self, FAILED, Style};
 use super::progress::Progress;
 use super::threads::Threads;
 use crate::diag::{Diagnostic, Result, Warned};
-use crate::io::Disk;
+use crate::io::{Disk, abandon_stages};
 use crate::pipeline::{self, Capture, InputSpec};
 use crate::task::{Observer, Task};
 use crate::world::World;
@@ -50,7 +50,10 @@ impl Session {
         let cancel = Arc::default();
         let last_word = LastWord::default();
         let bar = Arc::clone(&progress);
-        let clean_up = move || bar.end();
+        let clean_up = move || {
+            bar.end();
+            abandon_stages();
+        };
         interrupt::listen(
             Arc::clone(&cancel),
             last_word.clone(),

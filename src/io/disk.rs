@@ -7,8 +7,12 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::UNIX_EPOCH;
 
+use super::alive::Alive;
 use crate::diag::Result;
 use crate::world::{Entry, Identity, Stage, World, failure};
+
+/// What the name of every hidden folder of ours contains.
+pub(super) const MARK: &str = ".meshloom-";
 
 /// The files of this machine.
 #[derive(Debug, Clone, Copy, Default)]
@@ -131,6 +135,7 @@ struct DiskStage {
     hidden: PathBuf,
     created: Vec<PathBuf>,
     keep: bool,
+    alive: Alive,
 }
 
 impl DiskStage {
@@ -146,6 +151,7 @@ impl DiskStage {
             hidden: PathBuf::new(),
             created: Vec::new(),
             keep: false,
+            alive: Alive::new(),
         };
         stage.create_folders(parent)?;
         let name = out.file_name().unwrap_or_default().to_string_lossy();
@@ -166,8 +172,9 @@ impl DiskStage {
         static COUNT: AtomicUsize = AtomicUsize::new(0);
         let count = COUNT.fetch_add(1, Ordering::Relaxed);
         let process = std::process::id();
-        let hidden = folder.join(format!(".{name}.meshloom-{process}-{count}"));
+        let hidden = folder.join(format!(".{name}{MARK}{process}-{count}"));
         fs::create_dir(&hidden)?;
+        self.alive.made(&hidden);
         self.hidden = hidden;
         Ok(())
     }
@@ -180,6 +187,7 @@ impl DiskStage {
             .collect();
         for folder in missing.into_iter().rev() {
             fs::create_dir(folder).map_err(|error| failure(folder, "create the folder", &error))?;
+            self.alive.made(folder);
             self.created.push(folder.to_path_buf());
         }
         Ok(())
