@@ -127,6 +127,7 @@ pub fn failure(path: &Path, verb: &str, error: &io::Error) -> Box<Diagnostic> {
         ErrorKind::NotFound => "no such file or folder".to_string(),
         ErrorKind::PermissionDenied => "permission denied".to_string(),
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded => "the disk is full".to_string(),
+        ErrorKind::FileTooLarge => "files may not become that large".to_string(),
         ErrorKind::ReadOnlyFilesystem => "the file system is read-only".to_string(),
         ErrorKind::UnexpectedEof => "it ends too early".to_string(),
         ErrorKind::IsADirectory => "it is a folder".to_string(),
@@ -142,13 +143,19 @@ pub fn failure(path: &Path, verb: &str, error: &io::Error) -> Box<Diagnostic> {
 
 fn hint(kind: ErrorKind, verb: &str) -> Option<&'static str> {
     match (kind, verb) {
+        (ErrorKind::NotFound, "read" | "list") => {
+            Some("it was there when its folder was listed, or it is a link that leads nowhere")
+        }
         (ErrorKind::PermissionDenied, "read" | "list") => {
             Some("check the permissions of the file and of the folders above it")
+        }
+        (ErrorKind::NotFound | ErrorKind::NotADirectory | ErrorKind::IsADirectory, _) => {
+            Some("choose an output whose folders exist or can be created")
         }
         (ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem, _) => {
             Some("choose an output folder that can be written to")
         }
-        (ErrorKind::StorageFull | ErrorKind::QuotaExceeded, _) => {
+        (ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge, _) => {
             Some("free some space or choose another output; what was there before is unchanged")
         }
         _ => None,

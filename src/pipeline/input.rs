@@ -191,7 +191,7 @@ fn not_there(world: &dyn World, path: &Path) -> Box<Diagnostic> {
     let told = Diagnostic::error("no such file or folder").in_file(path);
     Box::new(match similar(world, path) {
         Some(name) => told.hint(format!("did you mean {}?", name.display())),
-        None => told,
+        None => told.hint("paths are taken from the folder the command runs in"),
     })
 }
 

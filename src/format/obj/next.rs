@@ -24,10 +24,21 @@ pub(super) fn read(bytes: &[u8], first: &FirstFrame, positions: &mut [f32]) -> R
         let start = frame.at;
         frame.statement(positions).map_err(|mut error| {
             error.place.line = Some(line_of(bytes, start));
-            error
+            // A frame of another mesh: its faces differ because its vertices do.
+            let counts = error.place.face.and_then(|_| other_count(bytes, first));
+            counts.unwrap_or(error)
         })?;
     }
     first.check_counts(frame.vertices, frame.faces)
+}
+
+/// What is to be said if the file has another number of vertices than the first frame.
+fn other_count(bytes: &[u8], first: &FirstFrame) -> Option<Box<Diagnostic>> {
+    let vertices = Statements::new(bytes, 0)
+        .filter(|statement| words(&statement.text).next() == Some(b"v"))
+        .count();
+    let faces = first.topology.faces();
+    first.check_counts(vertices, faces).err()
 }
 
 /// A file being read: where in it, and what has been seen.

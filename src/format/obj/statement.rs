@@ -105,7 +105,9 @@ pub(super) fn coordinate(word: Option<&[u8]>) -> Result<f32> {
         }
         Err(_) => {
             let word = String::from_utf8_lossy(word);
-            Diagnostic::error(format!("`{word}` is not a number")).err()
+            Diagnostic::error(format!("`{word}` is not a number"))
+                .hint("a vertex is `v x y z`; the file may be damaged")
+                .err()
         }
     }
 }
@@ -125,10 +127,13 @@ pub(super) fn index(word: &[u8], count: usize, what: &str) -> Result<i64> {
         Some(number) => Diagnostic::error(format!(
             "a face names {what} {number}, but only {count} stand before it"
         ))
+        .hint("negative numbers count back from the last one so far")
         .err(),
         None => {
             let word = String::from_utf8_lossy(word);
-            Diagnostic::error(format!("`{word}` is not a {what} number")).err()
+            Diagnostic::error(format!("`{word}` is not a {what} number"))
+                .hint("a face is `f 1 2 3` or `f 1/1/1 2/2/2 3/3/3`; the file may be damaged")
+                .err()
         }
     }
 }
