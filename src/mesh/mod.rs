@@ -3,6 +3,7 @@
 
 mod bounds;
 mod edges;
+pub mod rigid_align;
 mod sequence;
 mod topology;
 
