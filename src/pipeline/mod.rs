@@ -7,6 +7,8 @@ mod lanes;
 mod memory;
 mod open;
 mod output;
+mod picture;
+pub mod plot;
 mod save;
 
 pub use input::{FrameRange, InputSpec};
@@ -14,4 +16,5 @@ pub use key::{Key, KeyBuilder};
 pub use memory::{Made, Memory, Remembered};
 pub use open::{Capture, Content, Origin, open};
 pub use output::{Output, Plan, plan};
+pub use picture::{PictureFormat, save_picture};
 pub use save::{Saved, save};

@@ -73,8 +73,22 @@ impl std::fmt::Debug for FormatOf {
 /// an input would be written over or removed.
 pub fn plan(world: &dyn World, output: &Output, frames: usize) -> Result<Plan> {
     let plan = plan_writes(world, &output.path, frames)?;
-    for path in plan.writes.iter().chain(&plan.removals) {
-        for input in &output.inputs {
+    let touched = plan.writes.iter().chain(&plan.removals);
+    refuse_inputs(world, touched, &output.inputs)?;
+    Ok(plan)
+}
+
+/// Refuses to touch `paths` that are `inputs`, under whatever name.
+///
+/// # Errors
+/// One of them is.
+pub(super) fn refuse_inputs<'a>(
+    world: &dyn World,
+    paths: impl IntoIterator<Item = &'a PathBuf>,
+    inputs: &[PathBuf],
+) -> Result<()> {
+    for path in paths {
+        for input in inputs {
             if same_file(world, path, input)? {
                 return Diagnostic::error("the output would replace an input")
                     .in_file(path)
@@ -83,7 +97,7 @@ pub fn plan(world: &dyn World, output: &Output, frames: usize) -> Result<Plan> {
             }
         }
     }
-    Ok(plan)
+    Ok(())
 }
 
 fn plan_writes(world: &dyn World, out: &Path, frames: usize) -> Result<Plan> {

@@ -395,7 +395,7 @@ pub(super) fn with_margin([x, y]: [[f64; 2]; 2], share: f64) -> [[f64; 2]; 2] {
 
 impl Scene {
     /// Writes horizontal text in the theme's secondary colour; nothing if the theme has no text.
-    pub(super) fn write(&mut self, text: &str, at: Point, anchor: Anchor, theme: &Theme) {
+    pub fn write(&mut self, text: &str, at: Point, anchor: Anchor, theme: &Theme) {
         self.label(text, at, anchor, theme, false);
     }
 

@@ -1,0 +1,235 @@
+//! A loom's signals as the plain series that plots are drawn from, and the figure of both.
+
+use crate::math::b_spline::Point;
+use crate::plot::{Anchor, PoseSpace, Scene, Theme, TimeSignals, pose_space, time_signals};
+use crate::signal::pose::PoseSignal;
+use crate::signal::time::TimeSignal;
+
+/// What is known about the frames that signals were fitted to; any of it may be missing.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Fitted<'a> {
+    /// p_i, where the frames lie in pose space.
+    pub positions: &'a [Point],
+    /// Pinned frames, counted from 0, and where.
+    pub pins: &'a [(usize, Point)],
+    /// |z_i - psi(i)| over the root mean square distance of the frames from their mean.
+    pub errors: &'a [f64],
+}
+
+/// The curve is sampled this often between frames, if it can be afforded.
+const SMOOTH: usize = 24;
+
+/// Samples of the whole curve: beyond, a picture shows no difference.
+const SAMPLES: usize = 2400;
+
+/// Map and time signals of f and g. What was `fitted` is shown where it still belongs to the frames: an
+/// edit that changes their number leaves positions f(i) and no errors.
+pub fn series(time: &TimeSignal, pose: &PoseSignal, fitted: &Fitted) -> (PoseSpace, TimeSignals) {
+    let n = time.frames();
+    let times = dense_times(n);
+    let curve: Vec<Point> = times.iter().filter_map(|&t| time.at(t)).collect();
+    let reached: Vec<Point> = (1..=n).filter_map(|i| time.at(i as f64)).collect();
+    let speed = |&t: &f64| time.velocity(t).map(|[x, y]| x.hypot(y));
+    let rho: Vec<f64> = times.iter().filter_map(|&t| parameter(time, t)).collect();
+    let known = fitted.positions.len() == n && time.warps().is_empty();
+    let frames = if known {
+        fitted.positions.to_vec()
+    } else {
+        reached.clone()
+    };
+    let signals = TimeSignals {
+        position: curve.clone(),
+        speed: times.iter().filter_map(speed).collect(),
+        knots: knot_times(time, &times, &rho),
+        rho,
+        frames: frames.clone(),
+        parameters: (1..=n).filter_map(|i| parameter(time, i as f64)).collect(),
+        error: if known {
+            fitted.errors.to_vec()
+        } else {
+            Vec::new()
+        },
+        times: times.clone(),
+        window: None,
+    };
+    let pins = fitted.pins.iter().filter(|_| known);
+    let map = PoseSpace {
+        curve,
+        times,
+        frames,
+        reached,
+        sites: pose.sites().to_vec(),
+        controls: time.controls().to_vec(),
+        pins: pins.map(|&(frame, at)| (frame + 1, at)).collect(),
+        ..PoseSpace::default()
+    };
+    (map, signals)
+}
+
+/// Times in frames, every frame among them.
+fn dense_times(frames: usize) -> Vec<f64> {
+    let spans = frames.saturating_sub(1);
+    let between = (SAMPLES / spans.max(1)).clamp(4, SMOOTH);
+    let inner = (0..spans * between).map(|i| 1.0 + i as f64 / between as f64);
+    inner.chain((frames > 0).then_some(frames as f64)).collect()
+}
+
+/// rho at a time, from the start of the domain.
+fn parameter(time: &TimeSignal, t: f64) -> Option<f64> {
+    let (place, _) = time.place_at(t)?;
+    let from = crate::math::b_spline::Place::default();
+    Some(time.curve().distance(from, place))
+}
+
+/// Times at which the curve passes its interior knots, from samples of rho: between two samples rho is
+/// taken as straight.
+fn knot_times(time: &TimeSignal, times: &[f64], rho: &[f64]) -> Vec<f64> {
+    let spans = time.curve().spans();
+    let lengths = (0..spans).map(|span| time.curve().span_length(span));
+    let knots = lengths.scan(0.0, |sum, length| {
+        *sum += length;
+        Some(*sum)
+    });
+    let interior: Vec<f64> = knots.take(spans.saturating_sub(1)).collect();
+    let mut found = Vec::new();
+    for (t, u) in times.windows(2).zip(rho.windows(2)) {
+        let (low, high) = (u[0].min(u[1]), u[0].max(u[1]));
+        let first = interior.partition_point(|&knot| knot <= low);
+        let passed = interior[first..].iter().take_while(|&&knot| knot <= high);
+        found.extend(passed.map(|knot| t[0] + (t[1] - t[0]) * (knot - u[0]) / (u[1] - u[0])));
+    }
+    found
+}
+
+/// Map and time signals side by side, or below each other where the picture is higher than wide, under a
+/// line of text (none if it is empty).
+pub fn figure(
+    map: &PoseSpace,
+    signals: &TimeSignals,
+    title: &str,
+    [width, height]: [f32; 2],
+    theme: &Theme,
+) -> Scene {
+    let mut scene = Scene::new(width, height, theme.background);
+    let top = if title.is_empty() {
+        0.0
+    } else {
+        2.0 * theme.text
+    };
+    scene.write(
+        title,
+        [0.8 * theme.text, 1.4 * theme.text],
+        Anchor::Start,
+        theme,
+    );
+    let tall = height - top;
+    let across = width >= tall;
+    let first = if across {
+        [0.52 * width, tall]
+    } else {
+        [width, 0.55 * tall]
+    };
+    let (second, at) = if across {
+        ([width - first[0], tall], [first[0], top])
+    } else {
+        ([width, tall - first[1]], [0.0, top + first[1]])
+    };
+    scene.place(pose_space(map, first[0], first[1], theme).0, [0.0, top]);
+    scene.place(time_signals(signals, second[0], second[1], theme).0, at);
+    scene
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::thin_plate::Rows;
+    use crate::plot::Item;
+    use crate::signal::warp::Warp;
+
+    fn circle(n: usize) -> Vec<Point> {
+        let angle = |i: usize| 5.0 * i as f64 / n as f64;
+        (0..n).map(|i| [angle(i).cos(), angle(i).sin()]).collect()
+    }
+
+    fn signals(positions: &[Point], controls: usize) -> (TimeSignal, PoseSignal) {
+        let targets: Vec<f64> = positions.iter().flatten().copied().collect();
+        let rows = Rows {
+            positions,
+            targets: &targets,
+            width: 2,
+            weights: None,
+        };
+        let pose = PoseSignal::fit(&rows, 6).unwrap().signal;
+        (TimeSignal::fit(positions, controls, 0.5).unwrap(), pose)
+    }
+
+    #[test]
+    fn series_are_the_signals_at_their_times() {
+        let positions = circle(12);
+        let (time, pose) = signals(&positions, 8);
+        let fitted = Fitted {
+            positions: &positions,
+            pins: &[(2, positions[2])],
+            errors: &[0.1; 12],
+        };
+        let (map, plots) = series(&time, &pose, &fitted);
+        assert_eq!(map.frames, positions);
+        assert_eq!(map.pins, [(3, positions[2])]);
+        assert_eq!((map.controls.len(), map.sites.len()), (8, 6));
+        for (t, at) in map.times.iter().zip(&map.curve) {
+            assert_eq!(time.at(*t), Some(*at));
+        }
+        assert_eq!((map.times[0], *map.times.last().unwrap()), (1.0, 12.0));
+        for (frame, parameter) in plots.parameters.iter().zip(time.parameters()) {
+            assert!((frame - parameter).abs() < 1e-12); // both are sums of the same intervals
+        }
+        assert_eq!(plots.rho.len(), plots.times.len());
+        assert_eq!(plots.error.len(), 12);
+    }
+
+    #[test]
+    fn the_curve_passes_its_knots_at_the_marked_times() {
+        let (time, pose) = signals(&circle(30), 11);
+        let (_, plots) = series(&time, &pose, &Fitted::default());
+        assert_eq!(plots.knots.len(), 11 - 4);
+        let knots = time.curve().knots();
+        for (t, knot) in plots.knots.iter().zip(&knots[3..]) {
+            let rho = parameter(&time, *t).unwrap();
+            let step = knots[knots.len() - 1] / 29.0; // rho bends little within a 24th of a frame
+            assert!((rho - knot).abs() < step / 100.0, "{rho} {knot}");
+        }
+    }
+
+    #[test]
+    fn after_a_change_of_time_frames_lie_on_the_curve() {
+        let positions = circle(12);
+        let (time, pose) = signals(&positions, 8);
+        let (curve, places) = (time.curve().clone(), time.places().to_vec());
+        let warps = vec![Warp::Reverse { frames: 12 }];
+        let back = TimeSignal::new(curve, places, time.slopes().to_vec(), warps).unwrap();
+        let fitted = Fitted {
+            positions: &positions,
+            errors: &[0.1; 12],
+            ..Fitted::default()
+        };
+        let (map, plots) = series(&back, &pose, &fitted);
+        assert_eq!(map.frames, map.reached);
+        assert!(plots.error.is_empty());
+        assert!(plots.knots.is_sorted() && plots.knots.len() == 4);
+    }
+
+    #[test]
+    fn still_and_lone_frames_give_a_figure_of_any_shape() {
+        for n in [1, 2, 5] {
+            let positions = vec![[2.0, 3.0]; n];
+            let (time, pose) = signals(&positions, 4);
+            let (map, plots) = series(&time, &pose, &Fitted::default());
+            assert!(plots.knots.is_empty());
+            for size in [[900.0, 400.0], [400.0, 900.0], [1.0, 1.0]] {
+                let scene = figure(&map, &plots, "still", size, &Theme::dark());
+                assert_eq!([scene.width, scene.height], size);
+                assert!(scene.items.iter().any(|item| matches!(item, Item::Text(_))));
+            }
+        }
+    }
+}
