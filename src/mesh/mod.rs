@@ -2,12 +2,20 @@
 //! coordinates, x y z interleaved, in the units of the file it came from.
 
 mod bounds;
+mod components;
+mod corners;
 mod edges;
 pub mod rigid_align;
+mod gradients;
+mod poisson;
 mod sequence;
 mod topology;
 
 pub use bounds::Bounds;
+pub use components::Components;
+pub use corners::VertexCorners;
 pub use edges::Edges;
+pub use gradients::{Polar, ReferenceTriangle};
+pub use poisson::{Poisson, PoissonAnalysis};
 pub use sequence::{FrameSource, Sequence};
 pub use topology::{Attributes, Group, GroupKind, Topology, TopologyError};

@@ -1,17 +1,29 @@
 //! Shape spaces (CH12 §5): a shape as one point of a Euclidean space. A space is made for one
-//! connectivity and one reference pose; factors are computed then and shared.
+//! connectivity and one reference pose; factors are computed then and shared ([`Spaces`]).
 //!
 //! # Laws, tested over every space in `tests/space_laws.rs`
-//! - `decode(encode(v)) = v` to 1e-6 of the bounding box, after rigid alignment where the space is
-//!   invariant to rigid motions;
-//! - coordinates do not change (1e-9) under what [`Invariance`] promises;
-//! - the weighted sum of squares of a coordinate difference is comparable between the blocks.
+//! - `decode(encode(v)) = v` to 1e-6 of the bounding box, position and orientation included;
+//! - coordinates do not change (1e-9) under what [`Invariance`] promises, the named blocks apart;
+//! - a straight path between the coordinates of a pose and of its copy turned by 179 degrees is a rigid
+//!   motion (1e-6), except in `vertices`;
+//! - between a bar and its copy bent by 170 degrees edges keep their lengths to 2 % halfway, except in
+//!   `vertices`;
+//! - the sum of squares of a coordinate difference is comparable between the blocks, and with the sum
+//!   over all vertices of their squared displacements: see [`Block`].
 
+mod gradients;
+mod placement;
+mod registry;
+mod scales;
+mod sequence;
 mod vertices;
 
 use std::fmt;
 use std::ops::Range;
 
+pub use gradients::Gradients;
+pub use registry::{SPACES, SpaceKind, Spaces, State};
+pub use sequence::{LARGE_TURN, encode_frames};
 pub use vertices::Vertices;
 
 /// What may happen to a shape without a change of its coordinates (the stored position and
@@ -20,30 +32,43 @@ pub use vertices::Vertices;
 pub enum Invariance {
     /// Nothing: every motion shows.
     None,
-    /// Translations are kept apart, three numbers a component.
-    Translation,
-    /// Rigid motions are kept apart, six numbers.
+    /// Rigid motions: they show in the blocks [`MEAN_ROTATION`] and [`MEAN_VERTEX`] only, six numbers.
     Rigid,
 }
 
+/// The name of the block that carries a shape's orientation against the reference pose.
+pub const MEAN_ROTATION: &str = "mean rotation";
+
+/// The name of the block that carries a shape's position.
+pub const MEAN_VERTEX: &str = "mean vertex";
+
 /// Coordinates of one kind, and the factor that makes their differences comparable with the others'.
+///
+/// Weights are lengths: a change that happens everywhere at once (a turn by a small angle, a stretch by
+/// a small factor, a shift) counts as the root of the sum of the squared displacements of all vertices
+/// that it causes. Within a block, triangles count by area and edges by squared length.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Block {
     /// What they are ("rotation", "scale/shear", ..).
     pub name: &'static str,
     /// Which coordinates.
     pub range: Range<usize>,
+    /// By what the bare quantities (radians, ratios, lengths) are multiplied.
+    pub weight: f64,
 }
 
-/// Why a shape has no coordinates, or coordinates no shape. Indices count from 0.
+/// Why there is no space for a mesh. Indices count from 0.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SpaceError {
-    /// The system that finds positions is singular at this vertex.
+    /// The system that finds positions is singular at this vertex: the reference pose there has numbers
+    /// that are not finite, or sizes beyond double precision.
     Singular {
         /// A vertex of the part of the mesh that nothing holds.
         vertex: usize,
     },
-    /// The space needs what the mesh does not have.
+    /// The factors do not fit in memory.
+    TooLarge,
+    /// The space needs what the mesh or the stored state does not have.
     Unsuitable {
         /// What is missing, in words.
         reason: String,
@@ -53,11 +78,14 @@ pub enum SpaceError {
 impl fmt::Display for SpaceError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            SpaceError::Singular { vertex } => write!(
-                f,
-                "the position system is singular at vertex {}",
-                vertex + 1
-            ),
+            SpaceError::Singular { vertex } => {
+                write!(
+                    f,
+                    "the position system is singular at vertex {}",
+                    vertex + 1
+                )
+            }
+            SpaceError::TooLarge => f.write_str("the mesh is too large for this machine"),
             SpaceError::Unsuitable { reason } => f.write_str(reason),
         }
     }
@@ -65,7 +93,22 @@ impl fmt::Display for SpaceError {
 
 impl std::error::Error for SpaceError {}
 
+impl From<crate::math::sparse::SparseError> for SpaceError {
+    fn from(error: crate::math::sparse::SparseError) -> Self {
+        use crate::math::sparse::SparseError;
+        match error {
+            SparseError::NotPositiveDefinite { unknown } => {
+                SpaceError::Singular { vertex: unknown }
+            }
+            SparseError::TooLarge => SpaceError::TooLarge,
+        }
+    }
+}
+
 /// A shape space S of dimension d over one connectivity. Positions are 3V numbers, x y z interleaved.
+///
+/// Encoding and decoding keep their working memory inside and may be called from many threads at once;
+/// one call uses several threads by itself, with the same bits on any number of them.
 pub trait ShapeSpace: Send + Sync {
     /// Its name on the command line.
     fn name(&self) -> &'static str;
@@ -79,23 +122,28 @@ pub trait ShapeSpace: Send + Sync {
     /// The kinds of coordinates, in order, covering 0..d.
     fn blocks(&self) -> Vec<Block>;
 
-    /// Coordinates of a shape. `near`, where given, are the coordinates of a neighbouring shape (the
-    /// frame before): whatever has several branches, such as the logarithm of a rotation, takes the
-    /// nearest. Coordinates are already scaled by their block's weight.
+    /// What the space is made of besides connectivity: [`Spaces::restore`] makes it again.
+    fn state(&self) -> State;
+
+    /// Coordinates of a shape, scaled by their weights. What has several branches (the logarithm of a
+    /// rotation, an angle) takes the principal one.
     ///
-    /// # Errors
-    /// The shape has no coordinates in this space.
-    fn encode(
-        &self,
-        positions: &[f64],
-        near: Option<&[f64]>,
-        coordinates: &mut [f64],
-    ) -> Result<(), SpaceError>;
+    /// # Panics
+    /// `positions` is not 3V or `coordinates` not d long.
+    fn encode(&self, positions: &[f64], coordinates: &mut [f64]);
+
+    /// Moves the coordinates of a shape to the branch nearest `near`, the coordinates of its neighbour
+    /// in a sequence; the shape stays. Gives the number of rotations that differ from their neighbour's
+    /// by more than [`LARGE_TURN`] even so: there the path between the two shapes is a guess.
+    fn follow(&self, near: &[f64], coordinates: &mut [f64]) -> usize {
+        let _ = (near, coordinates);
+        0
+    }
 
     /// The shape of given coordinates. Any coordinates are accepted, also those of no shape: the
     /// nearest shape in the space's own least-squares sense comes back.
     ///
-    /// # Errors
-    /// The position system is singular.
-    fn decode(&self, coordinates: &[f64], positions: &mut [f64]) -> Result<(), SpaceError>;
+    /// # Panics
+    /// `coordinates` is not d or `positions` not 3V long.
+    fn decode(&self, coordinates: &[f64], positions: &mut [f64]);
 }

@@ -1,7 +1,7 @@
 //! Vertex coordinates, R^3V: the identity. Right where frames are close together; large rotations
 //! shrink between distant ones.
 
-use super::{Block, Invariance, ShapeSpace, SpaceError};
+use super::{Block, Invariance, ShapeSpace, State};
 
 /// The space of vertex coordinates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,21 +33,19 @@ impl ShapeSpace for Vertices {
         vec![Block {
             name: "position",
             range: 0..self.dimension(),
+            weight: 1.0,
         }]
     }
 
-    fn encode(
-        &self,
-        positions: &[f64],
-        _near: Option<&[f64]>,
-        coordinates: &mut [f64],
-    ) -> Result<(), SpaceError> {
-        coordinates.copy_from_slice(positions);
-        Ok(())
+    fn state(&self) -> State {
+        State::new(self, &[])
     }
 
-    fn decode(&self, coordinates: &[f64], positions: &mut [f64]) -> Result<(), SpaceError> {
+    fn encode(&self, positions: &[f64], coordinates: &mut [f64]) {
+        coordinates.copy_from_slice(positions);
+    }
+
+    fn decode(&self, coordinates: &[f64], positions: &mut [f64]) {
         positions.copy_from_slice(coordinates);
-        Ok(())
     }
 }

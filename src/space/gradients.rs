@@ -1,0 +1,270 @@
+//! Deformation gradients, R^(9F+6) (CH12 §5, Sumner & Popovic 2004): for each triangle its rotation,
+//! relative to the mean rotation of the shape, as a rotation vector (3 numbers) and its scale/shear (6),
+//! then the shape's placement (6 for a connected mesh, 3 more for each further part, vertices without a
+//! triangle being parts of their own). Polygons count as the triangles they are cut into.
+//!
+//! Right for transfer and for far poses of the same orientation of parts; wrong where two neighbouring
+//! triangles lie more than a half turn from the mean. Decoding is one Poisson solve ([`Poisson`]).
+//!
+//! Degenerate input: a triangle without a plane in the reference pose is given one
+//! ([`ReferenceTriangle::new`]) and has no say in the mean rotation; one without a plane in a shape takes
+//! the normal nearest the reference's. Duplicate triangles count twice, non-manifold edges and vertices
+//! need no care. All of them are reproduced. A mesh without triangles keeps its orientation in the
+//! positions of its vertices.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use rayon::prelude::*;
+
+use super::placement::{Placement, follow_rotation, triple};
+use super::registry::State;
+use super::scales::{Scales, area_shares};
+use super::{Block, Invariance, ShapeSpace};
+use crate::math::rotation::{exp, log, nearest};
+use crate::mesh::{Poisson, Polar, ReferenceTriangle};
+
+/// Triangles that one thread takes at a time; sums are taken chunk by chunk in this order.
+const CHUNK: usize = 2048;
+
+/// The space of deformation gradients.
+pub struct Gradients {
+    poisson: Arc<Poisson>,
+    reference: Arc<[f64]>,
+    /// Root of each triangle's share in the area.
+    shares: Vec<f64>,
+    rotation: f64,
+    stretch: f64,
+    placement: Placement,
+    pool: Mutex<Vec<Vec<Polar>>>,
+}
+
+impl Gradients {
+    /// The space over a factored system; `reference` is the pose it was made for.
+    pub(super) fn new(poisson: Arc<Poisson>, reference: Arc<[f64]>) -> Self {
+        let scales = Scales::new(&reference);
+        let components = poisson.analysis().components().clone();
+        Gradients {
+            shares: area_shares(poisson.reference()),
+            rotation: scales.rotation(),
+            stretch: scales.stretch(),
+            placement: Placement::new(components, &[], &scales),
+            poisson,
+            reference,
+            pool: Mutex::default(),
+        }
+    }
+
+    fn faces(&self) -> usize {
+        self.shares.len()
+    }
+
+    /// The coordinates' parts: rotations, scale/shear, placement.
+    fn split<'a>(&self, coordinates: &'a mut [f64]) -> [&'a mut [f64]; 3] {
+        let (rotations, rest) = coordinates.split_at_mut(3 * self.faces());
+        let (stretches, placement) = rest.split_at_mut(6 * self.faces());
+        [rotations, stretches, placement]
+    }
+}
+
+impl ShapeSpace for Gradients {
+    fn name(&self) -> &'static str {
+        "gradients"
+    }
+
+    fn dimension(&self) -> usize {
+        9 * self.faces() + self.placement.dimension()
+    }
+
+    fn invariance(&self) -> Invariance {
+        match self.faces() {
+            0 => Invariance::None,
+            _ => Invariance::Rigid,
+        }
+    }
+
+    fn blocks(&self) -> Vec<Block> {
+        let faces = self.faces();
+        let mut blocks = vec![
+            Block {
+                name: "rotation",
+                range: 0..3 * faces,
+                weight: self.rotation,
+            },
+            Block {
+                name: "scale/shear",
+                range: 3 * faces..9 * faces,
+                weight: self.stretch,
+            },
+        ];
+        blocks.extend(self.placement.blocks(9 * faces));
+        blocks
+    }
+
+    fn state(&self) -> State {
+        State::new(self, &self.reference)
+    }
+
+    fn encode(&self, positions: &[f64], coordinates: &mut [f64]) {
+        let mut polars = self.lock().pop().unwrap_or_default();
+        let mean = polar_factors(&self.poisson, positions, &mut polars);
+        let [rotations, stretches, placement] = self.split(coordinates);
+        encode_stretches(
+            &self.poisson,
+            &self.shares,
+            self.stretch,
+            &polars,
+            stretches,
+        );
+        let back = mean.inverse();
+        rotations
+            .par_chunks_mut(3 * CHUNK)
+            .zip(polars.par_chunks(CHUNK))
+            .zip(self.shares.par_chunks(CHUNK))
+            .for_each(|((rotations, polars), shares)| {
+                let faces = rotations.chunks_exact_mut(3).zip(polars).zip(shares);
+                for ((out, polar), share) in faces {
+                    let w = log(&(back * polar.rotation)) * (self.rotation * share);
+                    out.copy_from_slice(w.as_slice());
+                }
+            });
+        self.placement.encode(positions, &mean, &[], placement);
+        self.lock().push(polars);
+    }
+
+    fn follow(&self, near: &[f64], coordinates: &mut [f64]) -> usize {
+        let faces = self.faces();
+        let (rotations, placement) = coordinates.split_at_mut(9 * faces);
+        let turns = rotations[..3 * faces]
+            .par_chunks_mut(3)
+            .zip(near.par_chunks(3))
+            .zip(&self.shares)
+            .with_min_len(CHUNK)
+            .map(|((at, near), share)| follow_rotation(near, at, self.rotation * share))
+            .filter(|large| *large)
+            .count();
+        turns + self.placement.follow(&near[9 * faces..], placement)
+    }
+
+    fn decode(&self, coordinates: &[f64], positions: &mut [f64]) {
+        let faces = self.faces();
+        let reference = self.poisson.reference();
+        self.poisson.solve(
+            |face| {
+                let w = triple(coordinates, face) / (self.rotation * self.shares[face]);
+                let stretch = &coordinates[3 * faces + 6 * face..][..6];
+                let scale = 1.0 / (self.stretch * self.shares[face]);
+                let turn = exp(&w).to_rotation_matrix();
+                decode_stretch(&reference[face], stretch, scale).map(|image| turn * image)
+            },
+            positions,
+        );
+        self.placement.decode(&coordinates[9 * faces..], positions);
+    }
+}
+
+impl Gradients {
+    fn lock(&self) -> std::sync::MutexGuard<'_, Vec<Vec<Polar>>> {
+        self.pool.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The polar factors of all triangles of a shape and its mean rotation: the rotation nearest the
+/// area-weighted sum of the triangles' rotations, those without a plane (in the reference or the shape)
+/// left out.
+pub(super) fn polar_factors(
+    poisson: &Poisson,
+    positions: &[f64],
+    polars: &mut Vec<Polar>,
+) -> UnitQuaternion<f64> {
+    let triangles = poisson.analysis().triangles();
+    let reference = poisson.reference();
+    let sides = |face: usize| {
+        let [a, b, c] = triangles[face].map(|vertex| triple(positions, vertex as usize));
+        [b - a, c - a]
+    };
+    polars.resize(
+        triangles.len(),
+        Polar {
+            rotation: UnitQuaternion::identity(),
+            stretch: [0.0; 3],
+        },
+    );
+    let sums: Vec<(Matrix3<f64>, Vec<usize>)> = polars
+        .par_chunks_mut(CHUNK)
+        .enumerate()
+        .map(|(chunk, polars)| {
+            let mut sum = Matrix3::zeros();
+            let mut flat = Vec::new();
+            for (at, out) in polars.iter_mut().enumerate() {
+                let face = CHUNK * chunk + at;
+                let [e1, e2] = sides(face);
+                match reference[face].polar(&e1, &e2) {
+                    Some(polar) => {
+                        if !reference[face].degenerate {
+                            let turn = polar.rotation.to_rotation_matrix();
+                            sum += turn.matrix() * reference[face].area();
+                        }
+                        *out = polar;
+                    }
+                    None => flat.push(face),
+                }
+            }
+            (sum, flat)
+        })
+        .collect();
+    let mean = nearest(&sums.iter().map(|(sum, _)| sum).sum()).rotation;
+    for face in sums.into_iter().flat_map(|(_, flat)| flat) {
+        let [e1, e2] = sides(face);
+        polars[face] = reference[face].polar_near(&e1, &e2, &mean);
+    }
+    mean
+}
+
+/// Writes xx, xy, xz, yy, yz, zz of each triangle's S, times `weight` and share; off-diagonal entries
+/// stand for two and are scaled by the root of 2.
+pub(super) fn encode_stretches(
+    poisson: &Poisson,
+    shares: &[f64],
+    weight: f64,
+    polars: &[Polar],
+    stretches: &mut [f64],
+) {
+    let reference = poisson.reference();
+    stretches
+        .par_chunks_mut(6 * CHUNK)
+        .enumerate()
+        .for_each(|(chunk, stretches)| {
+            for (at, out) in stretches.chunks_exact_mut(6).enumerate() {
+                let face = CHUNK * chunk + at;
+                let s = reference[face].stretch_in_space(polars[face].stretch);
+                let scale = weight * shares[face];
+                for entry in 0..6 {
+                    out[entry] = s[entry] * scale * OFF_DIAGONAL[entry];
+                }
+            }
+        });
+}
+
+/// S b1 and S b2 of one triangle from its six coordinates, which are multiplied by `scale`.
+pub(super) fn decode_stretch(
+    triangle: &ReferenceTriangle,
+    stretch: &[f64],
+    scale: f64,
+) -> [Vector3<f64>; 2] {
+    let mut s = [0.0; 6];
+    for entry in 0..6 {
+        s[entry] = stretch[entry] * scale / OFF_DIAGONAL[entry];
+    }
+    triangle.stretched(&s)
+}
+
+/// Root of how often each of xx, xy, xz, yy, yz, zz stands in the matrix.
+const OFF_DIAGONAL: [f64; 6] = [
+    1.0,
+    std::f64::consts::SQRT_2,
+    std::f64::consts::SQRT_2,
+    1.0,
+    std::f64::consts::SQRT_2,
+    1.0,
+];

@@ -1,0 +1,188 @@
+//! All shape spaces by name, and what they share.
+
+use std::sync::{Arc, OnceLock};
+
+use super::{Block, Gradients, ShapeSpace, SpaceError, Vertices};
+use crate::mesh::{Poisson, PoissonAnalysis, Topology};
+
+/// A kind of shape space.
+pub struct SpaceKind {
+    /// Its name on the command line.
+    pub name: &'static str,
+    /// What it stores and when to use it, one line.
+    pub summary: &'static str,
+    build: Build,
+}
+
+/// Makes a space for given poses, or as an earlier one of its kind described itself.
+type Build = fn(&Spaces, &[&[f64]], Option<&State>) -> Result<Arc<dyn ShapeSpace>, SpaceError>;
+
+/// Every shape space. To add one: a file beside this one and a line here; `tests/space_laws.rs` then
+/// runs over it.
+pub const SPACES: &[SpaceKind] = &[
+    SpaceKind {
+        name: "vertices",
+        summary: "positions: exact and fast, for frames close together",
+        build: |spaces, _, _| Ok(Arc::new(Vertices::new(spaces.vertices()))),
+    },
+    SpaceKind {
+        name: "gradients",
+        summary: "rotation and stretch of each triangle: for transfer and large motions",
+        build: |spaces, _, _| {
+            Ok(Arc::new(Gradients::new(
+                spaces.poisson()?,
+                spaces.reference(),
+            )))
+        },
+    },
+];
+
+/// What a space is made of besides connectivity, for storing it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct State {
+    /// The space's name.
+    pub name: String,
+    /// The reference pose, 3V positions; empty for `vertices`.
+    pub reference: Vec<f64>,
+    /// The patch of each triangle, for `patch-lri`; else empty.
+    pub patches: Vec<u32>,
+    /// The weight of each block, in the order of [`ShapeSpace::blocks`].
+    pub weights: Vec<f64>,
+}
+
+impl State {
+    /// The state of a space without patches.
+    pub(super) fn new(space: &dyn ShapeSpace, reference: &[f64]) -> Self {
+        State {
+            name: space.name().to_string(),
+            reference: reference.to_vec(),
+            patches: Vec::new(),
+            weights: space
+                .blocks()
+                .iter()
+                .map(|block: &Block| block.weight)
+                .collect(),
+        }
+    }
+}
+
+/// What the spaces of one connectivity and one reference pose share: each factor is made when first
+/// needed and only once.
+pub struct Spaces {
+    topology: Arc<Topology>,
+    reference: Arc<[f64]>,
+    analysis: Arc<OnceLock<Result<Arc<PoissonAnalysis>, SpaceError>>>,
+    poisson: OnceLock<Result<Arc<Poisson>, SpaceError>>,
+}
+
+impl Spaces {
+    /// Spaces about a reference pose of 3V positions. Nothing is computed yet.
+    ///
+    /// # Panics
+    /// The reference is not 3V long.
+    pub fn new(topology: Arc<Topology>, reference: &[f64]) -> Self {
+        assert_eq!(
+            reference.len(),
+            3 * topology.vertices(),
+            "reference of another mesh"
+        );
+        Spaces {
+            topology,
+            reference: reference.into(),
+            analysis: Arc::default(),
+            poisson: OnceLock::new(),
+        }
+    }
+
+    /// Spaces about another reference pose: the symbolic factors are shared.
+    ///
+    /// # Panics
+    /// The reference is not 3V long.
+    #[must_use]
+    pub fn about(&self, reference: &[f64]) -> Self {
+        let mut other = Spaces::new(Arc::clone(&self.topology), reference);
+        other.analysis = Arc::clone(&self.analysis);
+        other
+    }
+
+    /// The space called `name`. `poses` are shapes that it will have to hold (a sample of the frames,
+    /// the keys), each 3V positions; a space that adapts to them (`patch-lri`) does, others ignore them.
+    ///
+    /// # Errors
+    /// [`SpaceError`]; an unknown name is unsuitable.
+    pub fn open(&self, name: &str, poses: &[&[f64]]) -> Result<Arc<dyn ShapeSpace>, SpaceError> {
+        (kind(name)?.build)(self, poses, None)
+    }
+
+    /// The space that had this state, its reference being that of `self` ([`Spaces::of_state`]).
+    ///
+    /// # Errors
+    /// As [`Spaces::open`]; also when the state does not fit the connectivity, or was written with
+    /// other block weights than the reference gives.
+    pub fn restore(&self, state: &State) -> Result<Arc<dyn ShapeSpace>, SpaceError> {
+        let space = (kind(&state.name)?.build)(self, &[], Some(state))?;
+        let blocks = space.blocks();
+        let same = blocks.len() == state.weights.len()
+            && blocks
+                .iter()
+                .zip(&state.weights)
+                .all(|(block, weight)| (block.weight - weight).abs() <= 1e-9 * block.weight);
+        match same {
+            true => Ok(space),
+            false => Err(SpaceError::Unsuitable {
+                reason: format!(
+                    "the coordinates in `{}` have other block weights",
+                    state.name
+                ),
+            }),
+        }
+    }
+
+    /// Spaces about the reference pose of a stored space.
+    ///
+    /// # Errors
+    /// The state has a reference of another mesh.
+    pub fn of_state(topology: Arc<Topology>, state: &State) -> Result<Self, SpaceError> {
+        let length = 3 * topology.vertices();
+        match state.reference.len() {
+            0 => Ok(Spaces::new(topology, &vec![0.0; length])),
+            found if found == length => Ok(Spaces::new(topology, &state.reference)),
+            found => Err(SpaceError::Unsuitable {
+                reason: format!("the reference pose has {found} coordinates, the mesh {length}"),
+            }),
+        }
+    }
+
+    /// The reference pose.
+    pub fn reference(&self) -> Arc<[f64]> {
+        Arc::clone(&self.reference)
+    }
+
+    fn vertices(&self) -> usize {
+        self.topology.vertices()
+    }
+
+    /// The factored system that finds positions from gradients.
+    fn poisson(&self) -> Result<Arc<Poisson>, SpaceError> {
+        self.poisson
+            .get_or_init(|| {
+                let analysis = self.analysis.get_or_init(|| {
+                    Ok(PoissonAnalysis::new(
+                        self.vertices(),
+                        self.topology.triangles(),
+                    )?)
+                });
+                Ok(Arc::new(Poisson::new(analysis.clone()?, &self.reference)?))
+            })
+            .clone()
+    }
+}
+
+fn kind(name: &str) -> Result<&'static SpaceKind, SpaceError> {
+    SPACES.iter().find(|kind| kind.name == name).ok_or_else(|| {
+        let known: Vec<&str> = SPACES.iter().map(|kind| kind.name).collect();
+        SpaceError::Unsuitable {
+            reason: format!("there is no space `{name}`; there are {}", known.join(", ")),
+        }
+    })
+}
