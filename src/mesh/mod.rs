@@ -5,9 +5,9 @@ mod bounds;
 mod components;
 mod corners;
 mod edges;
-pub mod rigid_align;
 mod gradients;
 mod poisson;
+pub mod rigid_align;
 mod sequence;
 mod topology;
 
