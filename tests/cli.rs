@@ -286,6 +286,77 @@ fn a_full_stdout_is_an_error() {
     );
 }
 
+/// A terminal of 24 rows and 80 columns with the binary in it.
+#[cfg(unix)]
+mod terminal {
+    use std::io::Write;
+    use std::path::Path;
+    use std::process::Command;
+
+    use portable_pty::{CommandBuilder, PtySize, native_pty_system};
+
+    use super::*;
+
+    /// Runs the binary; types `keys` once the screen shows `wanted`. What came on the screen, and the
+    /// exit code.
+    fn in_terminal(folder: &Path, args: &str, wanted: &str, keys: &str) -> (String, u32) {
+        let size = PtySize {
+            rows: 24,
+            cols: 80,
+            ..PtySize::default()
+        };
+        let pair = native_pty_system().openpty(size).unwrap();
+        let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_meshloom"));
+        command.args(args.split_whitespace());
+        command.cwd(folder);
+        command.env("TERM", "xterm-256color");
+        command.env_remove("NO_COLOR");
+        let mut child = pair.slave.spawn_command(command).unwrap();
+        drop(pair.slave);
+        let mut reader = pair.master.try_clone_reader().unwrap();
+        let mut writer = pair.master.take_writer().unwrap();
+        let (mut seen, mut typed, mut buffer) = (Vec::new(), false, [0; 4096]);
+        // The end of the process shows as the end of the stream, or as an error (Linux).
+        while let Ok(count @ 1..) = reader.read(&mut buffer) {
+            seen.extend_from_slice(&buffer[..count]);
+            if !typed && String::from_utf8_lossy(&seen).contains(wanted) {
+                writer.write_all(keys.as_bytes()).unwrap();
+                typed = true;
+            }
+        }
+        let text = String::from_utf8_lossy(&seen).into_owned();
+        (text, child.wait().unwrap().exit_code())
+    }
+
+    #[test]
+    fn long_work_shows_its_phase_and_ends_at_ctrl_c() {
+        let folder = tempdir().unwrap();
+        let input = folder.path().join("sheet");
+        sheet(4, 2).write_objs(&input);
+        let pipe = input.join("frame_0003.obj");
+        assert!(Command::new("mkfifo").arg(pipe).status().unwrap().success());
+        let (screen, code) = in_terminal(folder.path(), "convert sheet -o out", "load", "\x03");
+        assert!(screen.contains("/3"), "{screen:?}");
+        assert!(screen.trim_end().ends_with("interrupted"), "{screen:?}");
+        assert_eq!(code, 1);
+    }
+
+    #[test]
+    fn reports_and_errors_are_coloured_there_only() {
+        let folder = tempdir().unwrap();
+        sheet(4, 2).write_objs(&folder.path().join("sheet"));
+        let (screen, code) = in_terminal(folder.path(), "info sheet", "\n", "");
+        assert!(screen.contains("\x1b[1msheet\x1b[0m"), "{screen:?}");
+        assert_eq!(code, 0);
+        let (screen, code) = in_terminal(folder.path(), "info shet", "\n", "");
+        assert!(
+            screen.contains("\x1b[1;31merror\x1b[0m: shet"),
+            "{screen:?}"
+        );
+        assert_eq!(code, 1);
+    }
+}
+
 #[cfg(unix)]
 mod interruption {
     use std::path::Path;

@@ -2,10 +2,11 @@
 //! phases and counts its steps, here they are stamped and shown.
 
 use std::io::{self, IsTerminal};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread;
 use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde_json::{Map, Value, json};
 
 use super::print;
@@ -26,7 +27,7 @@ pub(super) struct Progress {
 }
 
 enum View {
-    Bar(ProgressBar),
+    Bar(Bar),
     Lines,
     Silent,
 }
@@ -46,7 +47,7 @@ impl Progress {
         let view = if quiet {
             View::Silent
         } else if io::stderr().is_terminal() {
-            View::Bar(ProgressBar::hidden())
+            View::Bar(Bar::begin())
         } else {
             View::Lines
         };
@@ -68,7 +69,7 @@ impl Progress {
     /// Takes the bar away; what is printed next stands alone.
     pub(super) fn end(&self) {
         if let View::Bar(bar) = &self.view {
-            bar.finish_and_clear();
+            bar.end();
         }
     }
 
@@ -96,7 +97,7 @@ impl Progress {
 
     fn show(&self, state: &mut State) {
         match &self.view {
-            View::Bar(bar) => show_bar(bar, state, self.begun),
+            View::Bar(bar) => bar.bar.set_position(state.done as u64),
             View::Lines if state.said.elapsed() >= LINE_EVERY => {
                 state.said = Instant::now();
                 print::people(&line(state));
@@ -115,9 +116,7 @@ impl Observer for Progress {
         (state.phase, state.since) = (name, now);
         (state.steps, state.done) = (steps, 0);
         if let View::Bar(bar) = &self.view {
-            bar.set_style(bar_style(steps));
-            bar.reset();
-            bar.set_message(name);
+            bar.phase(name, steps);
         }
         self.show(&mut state);
     }
@@ -129,22 +128,45 @@ impl Observer for Progress {
     }
 }
 
-fn show_bar(bar: &ProgressBar, state: &State, begun: Instant) {
-    if bar.is_hidden() && begun.elapsed() >= BAR_AFTER {
-        bar.set_draw_target(indicatif::ProgressDrawTarget::stderr());
-        bar.enable_steady_tick(TICK);
-    }
-    bar.set_length(state.steps as u64);
-    bar.set_position(state.done as u64);
+/// A bar that comes late: work that is done before shows none.
+struct Bar {
+    bar: ProgressBar,
+    ended: Arc<Mutex<bool>>,
 }
 
-fn bar_style(steps: usize) -> ProgressStyle {
-    let template = if steps == 0 {
-        "{spinner} {msg} {elapsed}"
-    } else {
-        "{spinner} {msg} {wide_bar} {pos}/{len} {eta}"
-    };
-    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
+impl Bar {
+    fn begin() -> Self {
+        let (bar, ended) = (ProgressBar::hidden(), Arc::<Mutex<bool>>::default());
+        let (late, over) = (bar.clone(), Arc::clone(&ended));
+        thread::spawn(move || {
+            thread::sleep(BAR_AFTER);
+            let over = over.lock().unwrap_or_else(PoisonError::into_inner);
+            if !*over {
+                late.set_draw_target(ProgressDrawTarget::stderr());
+                late.enable_steady_tick(TICK);
+            }
+        });
+        Bar { bar, ended }
+    }
+
+    fn phase(&self, name: &'static str, steps: usize) {
+        let template = if steps == 0 {
+            "{spinner} {msg} {elapsed}"
+        } else {
+            "{spinner} {msg} {wide_bar} {pos}/{len}, {eta} left"
+        };
+        let style = ProgressStyle::with_template(template);
+        self.bar
+            .set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        self.bar.reset();
+        self.bar.set_length(steps as u64);
+        self.bar.set_message(name);
+    }
+
+    fn end(&self) {
+        *self.ended.lock().unwrap_or_else(PoisonError::into_inner) = true;
+        self.bar.finish_and_clear();
+    }
 }
 
 /// `pose: 120 of 400, 12 s left`.
