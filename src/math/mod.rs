@@ -3,7 +3,6 @@
 pub mod b_spline;
 pub mod banded;
 pub mod cubic_spline;
-pub mod frame_spline;
 pub mod growing_qr;
 pub mod layout;
 pub mod least_squares;
@@ -17,4 +16,3 @@ pub mod symmetric;
 pub mod thin_plate;
 pub mod uniform_spline;
 pub mod variable_projection;
-pub mod weighted_stress;

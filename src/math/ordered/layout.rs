@@ -6,14 +6,15 @@
 //! 1/(D + eps max D)^2. Whether it is *accepted* depends on how well a curve and a plate of fixed
 //! fidelity (k = .8n, l = .6n) over it meet the motion at samples that were not fitted.
 
-use faer::linalg::solvers::SelfAdjointEigen;
-use faer::{Mat, MatRef, Side};
+use faer::{Mat, MatRef};
 use rayon::prelude::*;
 
 use super::samples::{Curve, Samples, mean};
 use super::unrefined;
-use crate::math::order_graph::{distances, geodesics, root_mean_square};
-use crate::math::weighted_stress::WeightedStress;
+use crate::math::b_spline::Point;
+use crate::math::layout::{Distances, Stop, majorise};
+use crate::math::order_graph::geodesics;
+use crate::math::symmetric;
 use crate::task::{Cancelled, Task};
 
 /// Reaches of the order graph, in root mean square distances.
@@ -26,8 +27,11 @@ const WORSE: f64 = 2.0;
 const FLOORS: f64 = 1.5;
 /// Softening of the weights, of the largest distance.
 const SOFTENING: f64 = 0.02;
-const ITERATIONS: usize = 60;
-const DECREASE: f64 = 1e-5;
+/// The stress need not be exact: what follows moves the curve anyway.
+const STOP: Stop = Stop {
+    change: 1e-5,
+    steps: 60,
+};
 /// Noise on the start, of its spread: it takes straight layouts off their line.
 const NOISE: f64 = 1e-3;
 
@@ -87,15 +91,20 @@ impl Layouts {
             curve: samples.curve(budget(0.8)),
             sites: budget(0.6),
         };
-        let plain = distances(samples.laid_out.as_ref());
-        let radius = root_mean_square(plain.as_ref());
+        let rows: Vec<f64> = samples
+            .laid_out
+            .row_iter()
+            .flat_map(|row| row.iter().copied().collect::<Vec<_>>())
+            .collect();
+        let plain = Distances::between(&rows, samples.laid_out.ncols());
+        let radius = root_mean_square(&plain);
         let tolerated = FLOORS * floor * samples.spread;
-        let started: Vec<(Candidate, Mat<f64>)> = REACHES
+        let started: Vec<(Candidate, Distances)> = REACHES
             .par_iter()
             .map(|&tau| {
                 task.check()?;
-                let graph = geodesics(plain.as_ref(), tau * radius);
-                let layout = stressed(graph.as_ref(), classical(graph.as_ref()));
+                let graph = geodesics(&plain, tau * radius);
+                let layout = stressed(&graph, classical(&graph), task)?;
                 task.step();
                 Ok((scale.candidate(tau, 1.0, layout), graph))
             })
@@ -113,8 +122,8 @@ impl Layouts {
         let mut walk = vec![started[accepted].0.clone()];
         for theta in WALK {
             task.check()?;
-            let targets = blend(plain.as_ref(), graph.as_ref(), theta, 1e-9 * radius);
-            let layout = stressed(targets.as_ref(), walk[walk.len() - 1].layout.clone());
+            let targets = blend(&plain, graph, theta, 1e-9 * radius);
+            let layout = stressed(&targets, walk[walk.len() - 1].layout.clone(), task)?;
             let next = scale.candidate(walk[0].choice.tau, theta, layout);
             task.step();
             least = least.min(next.score);
@@ -157,42 +166,62 @@ impl Scale<'_> {
     }
 }
 
-/// D0^(1-theta) G^theta, 0 on the diagonal; `least` keeps both away from 0.
-fn blend(plain: MatRef<'_, f64>, graph: MatRef<'_, f64>, theta: f64, least: f64) -> Mat<f64> {
-    Mat::from_fn(plain.nrows(), plain.ncols(), |i, j| {
-        if i == j {
-            return 0.0;
-        }
-        let (plain, graph) = (plain[(i, j)] + least, graph[(i, j)] + least);
-        plain * libm::pow(graph / plain, theta)
+/// D0^(1-theta) G^theta; `least` keeps both away from 0.
+fn blend(plain: &Distances, graph: &Distances, theta: f64, least: f64) -> Distances {
+    let mut pairs = plain.values().iter().zip(graph.values());
+    Distances::from_fn(plain.count(), |_, _| {
+        let (plain, graph) = pairs.next().unwrap_or((&0.0, &0.0));
+        (plain + least) * libm::pow((graph + least) / (plain + least), theta)
     })
 }
 
 /// The layout of least relative stress near `start`, centred, of root mean square radius 1.
-fn stressed(targets: MatRef<'_, f64>, mut start: Mat<f64>) -> Mat<f64> {
-    let reached = root_mean_square(distances(start.as_ref()).as_ref());
-    if reached > 0.0 {
-        start *= faer::Scale(root_mean_square(targets) / reached);
+fn stressed(targets: &Distances, mut start: Mat<f64>, task: &Task) -> Result<Mat<f64>, Cancelled> {
+    let radius = start.norm_l2() / (start.nrows() as f64).sqrt();
+    if radius > 0.0 {
+        // Mean squared distance is twice the squared radius.
+        start *= faer::Scale(root_mean_square(targets) / (2f64.sqrt() * radius));
     }
-    WeightedStress::relative(targets, SOFTENING, &[]).minimise(&mut start, ITERATIONS, DECREASE);
-    normalised(start)
+    let largest = targets.values().iter().copied().fold(0.0, f64::max);
+    let soft = SOFTENING * largest.max(f64::MIN_POSITIVE);
+    // In units of the largest distance, so that no square leaves the range of numbers.
+    let weight = |target: &f64| 1.0 / ((target + soft) / largest).powi(2);
+    let weights: Vec<f64> = targets.values().iter().map(weight).collect();
+    let points: Vec<Point> = (0..start.nrows())
+        .map(|i| [start[(i, 0)], start[(i, 1)]])
+        .collect();
+    task.check()?;
+    match majorise(targets, Some(&weights), &points, &[], &STOP, task) {
+        Ok(layout) => Ok(normalised(Mat::from_fn(start.nrows(), 2, |i, a| {
+            layout.positions[i][a]
+        }))),
+        Err(_) => {
+            task.check()?;
+            Ok(normalised(start))
+        }
+    }
+}
+
+/// Root mean square over all ordered pairs, each with itself included.
+fn root_mean_square(distances: &Distances) -> f64 {
+    let squares: f64 = distances.values().iter().map(|d| d * d).sum();
+    (2.0 * squares).sqrt() / distances.count().max(1) as f64
 }
 
 /// Classical scaling: the two leading principal coordinates of `targets`, slightly shaken.
-fn classical(targets: MatRef<'_, f64>) -> Mat<f64> {
-    let count = targets.nrows();
-    let squares = Mat::from_fn(count, count, |i, j| targets[(i, j)] * targets[(i, j)]);
+fn classical(targets: &Distances) -> Mat<f64> {
+    let count = targets.count();
+    let squares = Mat::from_fn(count, count, |i, j| targets.get(i, j).powi(2));
     let means = mean(squares.as_ref());
     let total = means.iter().sum::<f64>() / count as f64;
     let gram = Mat::from_fn(count, count, |i, j| {
         -0.5 * (squares[(i, j)] - means[i] - means[j] + total)
     });
-    let Ok(eigen) = SelfAdjointEigen::new(gram.as_ref(), Side::Lower) else {
+    let Some((values, vectors)) = symmetric::eigen(gram.as_ref()) else {
         return Mat::from_fn(count, 2, |i, a| if a == 0 { i as f64 } else { 0.0 });
     };
     let mut points = Mat::from_fn(count, 2, |i, a| {
-        let at = count - 1 - a.min(count - 1);
-        eigen.U()[(i, at)] * eigen.S()[at].max(1e-9).sqrt()
+        vectors[(i, a.min(count - 1))] * values[a.min(count - 1)].max(0.0).sqrt()
     });
     let noise = NOISE * points.norm_l2() / (2.0 * count as f64).sqrt();
     let mut random = seeded();

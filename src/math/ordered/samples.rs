@@ -2,7 +2,7 @@
 
 use faer::{Mat, MatRef};
 
-use crate::math::frame_spline::FrameSpline;
+use crate::math::cubic_spline::{CubicSpline, Ends};
 use crate::math::uniform_spline::{UniformDesign, UniformFitter};
 
 /// Up to so many samples the layout itself is made on the fitted samples, not on the frames.
@@ -42,23 +42,22 @@ impl Samples {
         let count = frames.nrows();
         let rate = if count < 64 { 4 } else { 2 };
         let layout_rate = if count > DENSE_LAYOUT { 1 } else { rate };
-        let spline = FrameSpline::new(frames);
         let finer_times = times(count, 2 * rate);
-        let finer = spline.at(&finer_times);
+        let finer = through(frames, &finer_times);
         let chord = Mat::from_fn(finer.nrows(), finer.ncols(), |row, c| {
             let time = finer_times[row];
             let i = (time as usize).min(count - 2);
             let x = time - i as f64;
             (1.0 - x) * frames[(i, c)] + x * frames[(i + 1, c)]
         });
-        let mean = crate::math::ordered::samples::mean(finer.as_ref());
+        let mean = mean(finer.as_ref());
         let spread = Mat::from_fn(finer.nrows(), finer.ncols(), |i, c| finer[(i, c)] - mean[c]);
         Samples {
             frames: count,
             rate,
-            dense: spline.at(&times(count, rate)),
+            dense: through(frames, &times(count, rate)),
             layout_rate,
-            laid_out: spline.at(&times(count, layout_rate)),
+            laid_out: through(frames, &times(count, layout_rate)),
             spread: spread.norm_l2(),
             linear: (&finer - chord).norm_l2(),
             finer,
@@ -70,7 +69,7 @@ impl Samples {
         if self.layout_rate == self.rate {
             return layout.to_owned();
         }
-        FrameSpline::new(layout).at(&times(self.frames, self.rate))
+        through(layout, &times(self.frames, self.rate))
     }
 
     /// A layout of the layout's samples at the frames.
@@ -99,6 +98,28 @@ impl Curve {
             .collect();
         UniformDesign::new(controls.nrows(), self.length, &times).apply(controls)
     }
+}
+
+/// The C2 cubic spline without a knot at the first and last inner frame ("not a knot") through `frames`
+/// (n x c) at 0, 1, .., n-1: its values at `times`, one row each.
+pub(super) fn through(frames: MatRef<'_, f64>, times: &[f64]) -> Mat<f64> {
+    let width = frames.ncols();
+    let knots: Vec<f64> = (0..frames.nrows()).map(|i| i as f64).collect();
+    let values: Vec<f64> = (0..frames.nrows() * width)
+        .map(|at| frames[(at / width, at % width)])
+        .collect();
+    let mut found = Mat::zeros(times.len(), width);
+    let Ok(spline) = CubicSpline::new(&knots, &values, width, Ends::NotAKnot) else {
+        return found;
+    };
+    let mut value = vec![0.0; width];
+    for (row, &time) in times.iter().enumerate() {
+        spline.evaluate(time, &mut value);
+        for (c, value) in value.iter().enumerate() {
+            found[(row, c)] = *value;
+        }
+    }
+    found
 }
 
 /// `rate` times an interval over \[0, n-1\], the frames included.

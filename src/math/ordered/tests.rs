@@ -1,5 +1,5 @@
+use super::samples::through;
 use super::*;
-use crate::math::frame_spline::FrameSpline;
 use crate::math::uniform_spline::UniformDesign;
 
 /// A motion in R^5 that passes an 8-shaped loop twice, the second time a little changed.
@@ -31,7 +31,7 @@ fn the_motion_is_met_between_the_frames_too() {
     let fit = fit(frames.as_ref(), &options(40), &Task::default()).unwrap();
     let times: Vec<f64> = (0..39 * 8 + 1).map(|i| f64::from(i) / 8.0).collect();
     let curve = UniformDesign::new(32, 39.0, &times).apply(fit.controls.as_ref());
-    let error = FrameSpline::new(frames.as_ref()).at(&times) - fit.plate.at(curve.as_ref());
+    let error = through(frames.as_ref(), &times) - fit.plate.at(curve.as_ref());
     let step = (0..39)
         .map(|i| (frames.row(i + 1) - frames.row(i)).norm_l2())
         .fold(0.0, f64::max);
