@@ -2,7 +2,8 @@
 //! Goals: 85 K faces in 10 ms, 1 M faces in 50 ms.
 
 use divan::Bencher;
-use meshloom::view::{Bounds, Camera, Image, Renderer, Style, Surface};
+use meshloom::image::Image;
+use meshloom::view::{Bounds, Camera, Renderer, Style, Surface};
 
 /// A wavy ball of `rings` times twice `rings` quads.
 fn ball(rings: u32) -> (Vec<[u32; 3]>, Vec<f32>) {

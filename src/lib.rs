@@ -21,6 +21,7 @@
 //! - frames are counted from 1 for people (messages, recipes, time t in \[1, n\]) and from 0 in arrays.
 
 pub mod diag;
+pub mod image;
 pub mod task;
 pub mod world;
 

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 const MAP: &[(&str, &str)] = &[
     ("task", ""),
     ("diag", "task"),
+    ("image", ""),
     ("world", "diag"),
     ("math", "task"),
     ("mesh", "math task"),
@@ -22,11 +23,11 @@ const MAP: &[(&str, &str)] = &[
     ("sample", "diag task mesh loom"),
     ("demo", "math mesh"),
     ("format", "diag mesh loom"),
-    ("plot", "math mesh"),
-    ("view", "math mesh"),
+    ("plot", "image math mesh"),
+    ("view", "image math mesh"),
     (
         "pipeline",
-        "diag task world math mesh space signal loom inbetween statistics metric edit sample demo format plot view",
+        "diag task image world math mesh space signal loom inbetween statistics metric edit sample demo format plot view",
     ),
     ("recipe", "diag task pipeline"),
     ("script", "diag task world pipeline recipe"),
@@ -34,7 +35,7 @@ const MAP: &[(&str, &str)] = &[
     ("io", "diag world"),
     (
         "tui",
-        "diag task pipeline recipe inbox plot view mesh signal loom edit sample",
+        "diag task image pipeline recipe inbox plot view mesh signal loom edit sample",
     ),
     ("cli", "*"),
 ];

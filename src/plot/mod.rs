@@ -3,7 +3,6 @@
 
 mod axes;
 mod chart;
-mod image;
 mod labels;
 mod legend;
 mod pose_space;
@@ -20,7 +19,6 @@ mod time_signal;
 
 pub use axes::{Axis, Plane, Scale, Tick, Ticks};
 pub use chart::{Chart, Panel, Series, Style, chart};
-pub use image::Image;
 pub use pose_space::{PoseSpace, pose_space};
 pub use raster::raster;
 pub use scatter::{Group, Scatter, scatter};

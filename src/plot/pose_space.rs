@@ -9,7 +9,8 @@ use super::legend::{Legend, Mark, arrow};
 use super::scene::{Path, Point, Rect, Scene, Stroke};
 use super::text::CAP_HEIGHT;
 use super::theme::Theme;
-use super::{Anchor, Image, Item, Scale};
+use super::{Anchor, Item, Scale};
+use crate::image::Image;
 
 /// What the map shows; any of the lists may be empty. Points that are not finite are left out.
 #[derive(Debug, Clone, Default)]

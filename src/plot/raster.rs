@@ -5,9 +5,9 @@ use tiny_skia::{
     PathBuilder, Pixmap, PixmapPaint, SpreadMode, StrokeDash, Transform,
 };
 
-use super::image::Image;
 use super::scene::{Color, Item, Label, Path, Point, Rect, Scene, Segment, Stroke, runs};
 use super::{stamp, text};
+use crate::image::Image;
 
 /// The largest side of an image in pixels: a mistaken size costs at most a gigabyte, not a crash.
 const MAX_SIDE: f32 = 16384.0;
@@ -18,7 +18,7 @@ pub fn raster(scene: &Scene, scale: f32) -> Image {
     let side = |length: f32| (length * scale).round().clamp(1.0, MAX_SIDE) as u32;
     let (width, height) = (side(scene.width), side(scene.height));
     let Some(pixmap) = Pixmap::new(width, height) else {
-        return blank(width, height);
+        return Image::new(width as usize, height as usize);
     };
     let mut canvas = Canvas {
         pixmap,
@@ -29,17 +29,9 @@ pub fn raster(scene: &Scene, scale: f32) -> Image {
     canvas.pixmap.fill(skia(scene.background));
     scene.items.iter().for_each(|item| canvas.draw(item));
     Image {
-        width,
-        height,
+        width: width as usize,
+        height: height as usize,
         rgba: canvas.pixmap.take_demultiplied(),
-    }
-}
-
-fn blank(width: u32, height: u32) -> Image {
-    Image {
-        width,
-        height,
-        rgba: vec![0; 4 * width as usize * height as usize],
     }
 }
 
@@ -163,7 +155,8 @@ impl Canvas {
     }
 
     fn picture(&mut self, rect: Rect, image: &Image) {
-        let size = IntSize::from_wh(image.width, image.height);
+        let side = |pixels: usize| u32::try_from(pixels).unwrap_or(0);
+        let size = IntSize::from_wh(side(image.width), side(image.height));
         let pixels = size.and_then(|size| Pixmap::from_vec(premultiplied(&image.rgba), size));
         let Some(pixels) = pixels else {
             return;
@@ -265,8 +258,8 @@ mod tests {
     const WHITE: Color = Color::hex(0xffffff);
     const RED: Color = Color::hex(0xff0000);
 
-    fn pixel(image: &Image, x: u32, y: u32) -> [u8; 4] {
-        let at = 4 * (y * image.width + x) as usize;
+    fn pixel(image: &Image, x: usize, y: usize) -> [u8; 4] {
+        let at = 4 * (y * image.width + x);
         [0, 1, 2, 3].map(|i| image.rgba[at + i])
     }
 

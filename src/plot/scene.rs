@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use super::Image;
+use crate::image::Image;
 
 /// A place in pixels.
 pub type Point = [f32; 2];

@@ -2,16 +2,16 @@
 
 use std::sync::Arc;
 
-use super::image::Image;
 use super::scene::{Anchor, Item, Rect, Scene};
 use super::text::{CAP_HEIGHT, text_width};
 use super::theme::Theme;
+use crate::image::Image;
 
 /// Pictures in rows of `columns` (0: as many as make the sheet about half as wide again as high), each
 /// in a cell as large as the largest of them, one pixel to a unit; the texts below them, shortened
 /// where they are wider than the cell. Without pictures, an empty sheet.
 pub fn sheet(pictures: &[(String, Arc<Image>)], columns: usize, theme: &Theme) -> Scene {
-    let largest = |side: fn(&Image) -> u32| pictures.iter().map(|(_, one)| side(one)).max();
+    let largest = |side: fn(&Image) -> usize| pictures.iter().map(|(_, one)| side(one)).max();
     let wide = largest(|image| image.width).unwrap_or(1) as f32;
     let tall = largest(|image| image.height).unwrap_or(1) as f32;
     let gap = (0.5 * theme.text).round();
@@ -87,8 +87,7 @@ mod tests {
             for item in &scene.items {
                 if let Item::Picture { rect, image: own } = item {
                     assert!(seen.iter().all(|other| !other.intersects(rect)));
-                    let at = 4 * ((rect.top as u32 + 5) * image.width + rect.left as u32 + 10);
-                    let at = at as usize;
+                    let at = 4 * ((rect.top as usize + 5) * image.width + rect.left as usize + 10);
                     assert_eq!(image.rgba[at..at + 4], own.rgba[..4]);
                     seen.push(*rect);
                 }

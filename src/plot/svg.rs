@@ -6,9 +6,9 @@ use std::fmt::Write;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 
-use super::image::Image;
 use super::scene::{Anchor, Color, Item, Label, Path, Point, Rect, Scene, Segment, Stroke, runs};
 use super::text::text_width;
+use crate::image::Image;
 
 /// The scene as the text of an SVG file, one primitive a line.
 pub fn svg(scene: &Scene) -> String {

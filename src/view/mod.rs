@@ -6,16 +6,15 @@
 
 mod camera;
 mod heat;
-mod image;
 mod normals;
 mod raster;
 mod shade;
 
 pub use camera::{Bounds, Camera, Projection, Up};
 pub use heat::heat_colours;
-pub use image::Image;
 pub use shade::{Style, Wire};
 
+use crate::image::Image;
 use raster::Raster;
 
 /// What is drawn: triangles over positions, both as [`Topology`](crate::mesh::Topology) and

@@ -2,9 +2,9 @@
 
 use super::Surface;
 use super::camera::Eye;
-use super::image::{Image, blend};
 use super::normals::unit;
 use super::raster::{Raster, Sample};
+use crate::image::{Image, blend};
 
 /// Lines along the triangles' edges.
 #[derive(Debug, Clone, Copy, PartialEq)]

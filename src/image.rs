@@ -1,4 +1,6 @@
-//! Pixels.
+//! Pixels, and pixels as a PNG file.
+
+use std::io;
 
 /// A picture: rows from the top, red green blue alpha, alpha not multiplied in.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -48,6 +50,25 @@ impl Image {
         }
         half
     }
+
+    /// The bytes of a PNG file.
+    ///
+    /// # Errors
+    /// `rgba` has another length than `width` and `height` ask for, or one of them is 0.
+    pub fn png(&self) -> io::Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, side(self.width)?, side(self.height)?);
+        encoder.set_color(png::ColorType::Rgba);
+        encoder.set_depth(png::BitDepth::Eight);
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(&self.rgba)?;
+        writer.finish()?;
+        Ok(bytes)
+    }
+}
+
+fn side(pixels: usize) -> io::Result<u32> {
+    u32::try_from(pixels).map_err(io::Error::other)
 }
 
 /// The mean of four colours, each counting by its alpha.
@@ -67,7 +88,7 @@ fn mean(pixels: [[u8; 4]; 4]) -> [u8; 4] {
 }
 
 /// `colour` with `alpha` in \[0, 1\] laid over `under`.
-pub(super) fn blend(under: &mut [u8; 4], colour: [f32; 3], alpha: f32) {
+pub(crate) fn blend(under: &mut [u8; 4], colour: [f32; 3], alpha: f32) {
     if alpha >= 1.0 {
         let [red, green, blue] = colour.map(|value| (value + 0.5) as u8);
         *under = [red, green, blue, 255];
@@ -82,4 +103,36 @@ pub(super) fn blend(under: &mut [u8; 4], colour: [f32; 3], alpha: f32) {
         *byte = ((value * alpha + f32::from(*byte) * below) / total + 0.5) as u8;
     }
     under[3] = (total * 255.0 + 0.5) as u8;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn png_files_decode_to_the_same_pixels() {
+        let image = Image {
+            width: 3,
+            height: 2,
+            rgba: (0..24).map(|i| i * 10).collect(),
+        };
+        let bytes = image.png().unwrap();
+        let mut reader = png::Decoder::new(io::Cursor::new(bytes))
+            .read_info()
+            .unwrap();
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut pixels).unwrap();
+        assert_eq!((info.width, info.height), (3, 2));
+        assert_eq!(pixels, image.rgba);
+    }
+
+    #[test]
+    fn pixels_that_do_not_fit_the_size_are_an_error() {
+        let image = Image {
+            width: 3,
+            height: 2,
+            rgba: vec![0; 7],
+        };
+        assert!(image.png().is_err());
+    }
 }
