@@ -1,1 +1,57 @@
-//! Built-in captures, generated: the same bytes on every run.
+//! Built-in captures, generated: the same bytes on every run and every machine.
+//!
+//! Nothing is read from files. Angles go through `libm` and sums through plain loops, never through
+//! the platform's own sine or a thread pool, so that two machines agree to the last bit.
+
+mod bar;
+mod lattice;
+
+use crate::mesh::Sequence;
+
+pub use bar::pose as bar_pose;
+
+/// What the frames of a capture are to each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// A motion: frames in the order of time.
+    Motion,
+    /// Separate shapes: their order means nothing.
+    Poses,
+}
+
+/// A built-in capture and how to look at it. Up is y, lengths are metres.
+#[derive(Debug, Clone, Copy)]
+pub struct Demo {
+    /// What it is called on the command line.
+    pub name: &'static str,
+    /// One line for a list of captures.
+    pub about: &'static str,
+    /// A motion, which has frames per second, or poses, which have none.
+    pub kind: Kind,
+    /// Whether it travels over the ground, so that its root motion is worth taking apart.
+    pub travels: bool,
+    /// A good first view: yaw and pitch of an orbiting camera, in radians.
+    pub view: [f64; 2],
+    /// Makes it.
+    pub generate: fn() -> Sequence,
+}
+
+/// All built-in captures, the one to start with first.
+pub const DEMOS: &[Demo] = &[Demo {
+    name: "bar",
+    about: "a square bar bends to 170 degrees, twists by half a turn, then does both",
+    kind: Kind::Motion,
+    travels: false,
+    view: [0.4, 0.3],
+    generate: bar::generate,
+}];
+
+impl Demo {
+    /// The capture of that name.
+    pub fn find(name: &str) -> Option<&'static Demo> {
+        DEMOS.iter().find(|demo| demo.name == name)
+    }
+}
+
+#[cfg(test)]
+mod tests;
