@@ -8,8 +8,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use meshloom::io::Disk;
-use meshloom::mesh::{FrameSource, Sequence, Topology};
-use meshloom::pipeline::{Content, InputSpec, Output, open, save};
+use meshloom::mesh::{Sequence, Topology};
+use meshloom::pipeline::{InputSpec, Output, open, save};
 use meshloom::task::Task;
 use rayon::prelude::*;
 
@@ -102,7 +102,7 @@ fn main() {
             || {},
             || {
                 let opened = open(&Disk, &InputSpec::new(&out), &task).expect("read");
-                let Content::Sequence(read) = &opened.output.content;
+                let read = opened.output.content.frames();
                 assert_eq!(read.frames(), FRAMES);
             },
             || {},

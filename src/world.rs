@@ -72,13 +72,16 @@ pub trait Stage: Send + Sync {
     /// It cannot be created.
     fn create(&self, name: &str) -> Result<Box<dyn Write + Send>>;
 
+    /// What is said when writing to a file of [`Stage::create`] fails.
+    fn failure(&self, error: &io::Error) -> Box<Diagnostic>;
+
     /// A new staged file with this content.
     ///
     /// # Errors
     /// It cannot be created, or the disk is full.
     fn write(&self, name: &str, bytes: &[u8]) -> Result<()> {
         let written = self.create(name)?.write_all(bytes);
-        written.map_err(|error| failure(Path::new(name), "write", &error))
+        written.map_err(|error| self.failure(&error))
     }
 
     /// Moves each staged file to its place, in this order, then removes files that are not wanted any
@@ -318,6 +321,10 @@ impl Write for MemoryFile {
 }
 
 impl Stage for MemoryStage {
+    fn failure(&self, error: &io::Error) -> Box<Diagnostic> {
+        failure(Path::new("memory"), "write", error)
+    }
+
     fn create(&self, name: &str) -> Result<Box<dyn Write + Send>> {
         lock(&self.staged).insert(name.to_string(), Vec::new());
         Ok(Box::new(MemoryFile {

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use meshloom::format::{FORMATS, Kind};
+use meshloom::format::{Encoding, FORMATS, Kind};
 use meshloom::mesh::{FrameSource, Sequence, Topology};
 use meshloom::pipeline::{Capture, Content, FrameRange, InputSpec, Output, open, save};
 use meshloom::task::Task;
@@ -38,22 +38,112 @@ fn write(world: &dyn World, source: &dyn FrameSource, path: &str) -> Vec<String>
 }
 
 #[test]
-fn every_mesh_format_gives_back_what_it_was_given() {
+fn every_format_gives_back_what_it_was_given() {
+    let given = capture(3).with_fps(Some(25.0));
     for format in FORMATS {
-        let Kind::Mesh(_) = format.kind;
         for ending in format.endings {
             let world = MemoryWorld::new();
-            let given = capture(3);
-            let out = format!("out/f####.{ending}");
-            let names = write(&world, &given, &out);
-            assert_eq!(names[2], format!("out/f0003.{ending}"));
-            let back = read(&world, &InputSpec::new(out));
-            assert_eq!(back.positions(), given.positions(), "{}", format.name);
+            let out = match format.kind {
+                Kind::Mesh(_) => format!("out/f####.{ending}"),
+                Kind::Cache(_) => format!("out/f.{ending}"),
+            };
+            write(&world, &given, &out);
+            let spec = match format.kind {
+                Kind::Mesh(_) => InputSpec::new(&out),
+                Kind::Cache(_) => {
+                    write(&world, &given.slice(1..2), "base.ply");
+                    InputSpec {
+                        mesh: Some("base.ply".into()),
+                        ..InputSpec::new(&out)
+                    }
+                }
+            };
+            let back = read(&world, &spec);
+            let name = format.name;
+            assert_eq!(back.positions(), given.positions(), "{name}");
             assert!(
                 back.topology().same_connectivity(given.topology()),
-                "{}",
-                format.name
+                "{name}"
             );
+            let carries_rate = name != "PC2";
+            assert_eq!(back.fps(), carries_rate.then_some(25.0), "{name}");
+        }
+    }
+}
+
+#[test]
+fn ply_in_all_encodings_and_mixed() {
+    let world = MemoryWorld::new();
+    let given = capture(2);
+    let encodings = [Encoding::Ascii, Encoding::LittleEndian, Encoding::BigEndian];
+    let mut names = Vec::new();
+    for (at, encoding) in encodings.into_iter().enumerate() {
+        let out = format!("{at}/f#.ply");
+        let output = Output::from(&out).encoded(encoding);
+        save(&world, &given, &output, &Task::default()).unwrap();
+        let back = read(&world, &InputSpec::new(&out));
+        assert_eq!(back.positions(), given.positions(), "{encoding:?}");
+        names.push(format!("{at}/f2.ply").into());
+    }
+    let spec = InputSpec {
+        paths: names,
+        ..InputSpec::default()
+    };
+    let mixed = read(&world, &spec);
+    for frame in 0..3 {
+        assert_eq!(mixed.frame(frame), given.frame(1));
+    }
+}
+
+#[test]
+fn ply_as_people_write_it() {
+    let world = MemoryWorld::new();
+    let text = "ply\r\nformat ascii 1.0\r\ncomment by hand\r\nobj_info none\r\nelement camera 1\r\nproperty float fov\r\n\
+        element vertex 4\r\nproperty uchar red\r\nproperty double z\r\nproperty list uchar int tags\r\nproperty float x\r\n\
+        property short y\r\nproperty float s\r\nproperty float t\r\nelement face 2\r\nproperty uchar flag\r\n\
+        property list uchar uint vertex_index\r\nelement edge 1\r\nproperty int a\r\nend_header\r\n\
+        50\r\n255 3 2 7 7 1 2 0 0\r\n0 6 0 4 5 1 0\r\n0 9 1 1 7 8 1 1\r\n0 0 0 0 0 0 1\r\n1 3 0 1 2\r\n0 3 0 2 3\r\n5\r\n";
+    world.insert("a.ply", text);
+    let read = read(&world, &InputSpec::new("a.ply"));
+    assert_eq!(
+        read.positions(),
+        [1., 2., 3., 4., 5., 6., 7., 8., 9., 0., 0., 0.]
+    );
+    assert_eq!(read.topology().face(1), [0, 2, 3]);
+    write(&world, &read, "b.obj");
+    let obj = String::from_utf8(world.read(Path::new("b.obj")).unwrap()).unwrap();
+    assert!(
+        obj.contains("vt 1 1\n") && obj.ends_with("f 1/1 3/3 4/4\n"),
+        "{obj}"
+    );
+}
+
+#[test]
+fn ply_keeps_texture_coordinates_of_vertices_and_of_corners() {
+    let seam = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nvt 0.5 0.5\n\
+        f 1/1 2/2 3/3\nf 2/4 4/1 3/3\n";
+    for (obj, corners) in [
+        (seam.to_string(), true),
+        (seam.replace("2/4", "2/2"), false),
+    ] {
+        let world = MemoryWorld::new();
+        world.insert("a.obj", obj);
+        let given = read(&world, &InputSpec::new("a.obj"));
+        for encoding in [Encoding::Ascii, Encoding::BigEndian] {
+            let output = Output::from("b.ply").encoded(encoding);
+            save(&world, &given, &output, &Task::default()).unwrap();
+            let header = world.read(Path::new("b.ply")).unwrap();
+            let header = String::from_utf8_lossy(&header).into_owned();
+            assert_eq!(header.contains("float texcoord"), corners, "{header}");
+            let back = read(&world, &InputSpec::new("b.ply"));
+            let coordinates = |sequence: &Sequence| {
+                let attributes = sequence.topology().attributes().clone();
+                let corners = attributes.corner_texture.iter();
+                corners
+                    .map(|&at| attributes.texture_coordinates[at as usize])
+                    .collect::<Vec<_>>()
+            };
+            assert_eq!(coordinates(&back), coordinates(&given));
         }
     }
 }

@@ -17,6 +17,8 @@ pub struct FirstFrame {
     pub positions: Vec<f32>,
     /// Frames per second, where the file says so.
     pub fps: Option<f64>,
+    /// How the bytes of its faces are to be read: equal bytes mean equal faces only if this is equal too.
+    pub layout: String,
     /// The bytes of its faces.
     pub runs: Vec<FaceRun>,
 }

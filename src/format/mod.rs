@@ -3,14 +3,19 @@
 //!
 //! To add a format: a file here, a line in [`FORMATS`]; `tests/format_round_trip.rs` runs over it.
 
+pub mod cache;
 mod face_check;
+pub mod mdd;
 pub mod obj;
+pub mod pc2;
+pub mod ply;
 
 use std::sync::Arc;
 
 use crate::diag::{Diagnostic, Result};
 use crate::mesh::Topology;
 
+pub use cache::CacheFormat;
 pub use face_check::{FaceRun, FirstFrame};
 
 /// A file format: its name, its endings, and what it can hold.
@@ -31,15 +36,37 @@ pub struct Format {
 pub enum Kind {
     /// One frame with its faces: a sequence is one file a frame.
     Mesh(&'static dyn MeshFormat),
+    /// Frames without faces.
+    Cache(&'static dyn CacheFormat),
 }
 
 /// All formats.
-pub const FORMATS: &[Format] = &[Format {
-    name: "OBJ",
-    endings: &["obj"],
-    recognises: |_| false,
-    kind: Kind::Mesh(&obj::Obj),
-}];
+pub const FORMATS: &[Format] = &[
+    Format {
+        name: "OBJ",
+        endings: &["obj"],
+        recognises: |_| false,
+        kind: Kind::Mesh(&obj::Obj),
+    },
+    Format {
+        name: "PLY",
+        endings: &["ply"],
+        recognises: |head| head.starts_with(b"ply\n") || head.starts_with(b"ply\r\n"),
+        kind: Kind::Mesh(&ply::Ply),
+    },
+    Format {
+        name: "PC2",
+        endings: &["pc2"],
+        recognises: pc2::recognises,
+        kind: Kind::Cache(&pc2::Pc2),
+    },
+    Format {
+        name: "MDD",
+        endings: &["mdd"],
+        recognises: |_| false,
+        kind: Kind::Cache(&mdd::Mdd),
+    },
+];
 
 /// Formats that are asked for and not there yet: ending and name.
 pub const NOT_YET: &[(&str, &str)] = &[
@@ -67,7 +94,28 @@ pub trait MeshFormat: Sync {
     fn read_next(&self, bytes: &[u8], first: &FirstFrame, positions: &mut [f32]) -> Result<()>;
 
     /// Whatever writes frames of this connectivity; what all frames share is formatted once, here.
-    fn writer(&self, topology: &Arc<Topology>, fps: Option<f64>) -> Box<dyn FrameWriter>;
+    fn writer(&self, topology: &Arc<Topology>, options: WriteOptions) -> Box<dyn FrameWriter>;
+}
+
+/// How to write.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct WriteOptions {
+    /// Frames per second, where known.
+    pub fps: Option<f64>,
+    /// How numbers are laid out, in formats that leave the choice (PLY).
+    pub encoding: Encoding,
+}
+
+/// How numbers are laid out in a file.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Encoding {
+    /// As text.
+    Ascii,
+    /// In binary, the lowest byte first.
+    #[default]
+    LittleEndian,
+    /// In binary, the highest byte first.
+    BigEndian,
 }
 
 /// Writes frames of one connectivity.
@@ -87,6 +135,12 @@ pub fn by_ending(ending: &str) -> Option<&'static Format> {
 /// The format that the first bytes of a file show, if they show one.
 pub fn by_content(head: &[u8]) -> Option<&'static Format> {
     FORMATS.iter().find(|format| (format.recognises)(head))
+}
+
+/// The shortest digits that read back as `value`, without `.0`.
+fn shortest(digits: &mut zmij::Buffer, value: f32) -> &[u8] {
+    let text = digits.format(value).as_bytes();
+    text.strip_suffix(b".0").unwrap_or(text)
 }
 
 /// What is said about a file that is empty.

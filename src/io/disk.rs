@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::UNIX_EPOCH;
 
 use super::alive::Alive;
-use crate::diag::Result;
+use crate::diag::{Diagnostic, Result};
 use crate::world::{Entry, Identity, Stage, World, failure};
 
 /// What the name of every hidden folder of ours contains.
@@ -218,13 +218,12 @@ impl Stage for DiskStage {
     fn create(&self, name: &str) -> Result<Box<dyn Write + Send>> {
         let path = self.hidden.join(name);
         let file = OpenOptions::new().write(true).create_new(true).open(path);
-        let file = file.map_err(|error| failure(&self.out, "write", &error))?;
+        let file = file.map_err(|error| self.failure(&error))?;
         Ok(Box::new(file))
     }
 
-    fn write(&self, name: &str, bytes: &[u8]) -> Result<()> {
-        let written = self.create(name)?.write_all(bytes);
-        written.map_err(|error| failure(&self.out, "write", &error))
+    fn failure(&self, error: &io::Error) -> Box<Diagnostic> {
+        failure(&self.out, "write", error)
     }
 
     fn commit(

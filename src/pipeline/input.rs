@@ -13,7 +13,7 @@ use globset::GlobBuilder;
 
 use super::output::Pattern;
 use crate::diag::{Diagnostic, Result};
-use crate::format::{self, Format, NOT_YET};
+use crate::format::{self, Format, Kind, NOT_YET};
 use crate::world::World;
 
 /// INPUT and the options that say how to read it.
@@ -99,6 +99,8 @@ pub(super) struct Files {
     /// In the order of the frames.
     pub(super) paths: Vec<PathBuf>,
     pub(super) format: &'static Format,
+    /// The mesh that stands beside a cache.
+    pub(super) mesh: Option<PathBuf>,
     pub(super) warnings: Vec<Diagnostic>,
 }
 
@@ -131,11 +133,16 @@ pub(super) fn find(world: &dyn World, spec: &InputSpec) -> Result<Files> {
     }
 }
 
-/// Files in the order given, all of one format.
-fn listed(paths: Vec<PathBuf>) -> Result<Files> {
+/// Files in the order given, all of one format; or one cache and the mesh it belongs to.
+fn listed(mut paths: Vec<PathBuf>) -> Result<Files> {
     let mut formats = Vec::with_capacity(paths.len());
     for path in &paths {
         formats.push(format_of(path)?);
+    }
+    let mut mesh = None;
+    if let Some(at) = mesh_beside_cache(&formats) {
+        formats.remove(at);
+        mesh = Some(paths.remove(at));
     }
     let format = formats[0];
     if let Some(at) = formats.iter().position(|one| one.name != format.name) {
@@ -151,8 +158,18 @@ fn listed(paths: Vec<PathBuf>) -> Result<Files> {
     Ok(Files {
         paths,
         format,
+        mesh,
         warnings,
     })
+}
+
+/// Which of two files is the mesh, if the other is a cache.
+fn mesh_beside_cache(formats: &[&Format]) -> Option<usize> {
+    match formats.iter().map(|format| format.kind).collect::<Vec<_>>()[..] {
+        [Kind::Mesh(_), Kind::Cache(_)] => Some(0),
+        [Kind::Cache(_), Kind::Mesh(_)] => Some(1),
+        _ => None,
+    }
 }
 
 /// The format that the ending of `path` names.
@@ -233,11 +250,12 @@ fn in_folder(world: &dyn World, folder: &Path) -> Result<Files> {
             .err();
     }
     sort(&mut paths);
+    let formats: Vec<&Format> = paths.iter().flat_map(|path| format_of(path)).collect();
     let groups = groups(&paths);
     let several = groups.len() > 1 && groups.values().any(|group| group.len() > 1);
-    let formats = paths.iter().filter_map(|path| path.extension());
-    let mixed = formats.collect::<std::collections::BTreeSet<_>>().len() > 1;
-    if several || mixed {
+    let mixed = formats.iter().any(|format| format.name != formats[0].name);
+    let many_each = !matches!(formats[0].kind, Kind::Mesh(_)) && formats.len() > 1;
+    if (several || mixed || many_each) && mesh_beside_cache(&formats).is_none() {
         return ambiguous(folder, &groups);
     }
     listed(paths)

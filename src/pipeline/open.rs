@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use super::input::{self, Files, InputSpec};
 use super::lanes;
 use crate::diag::{Diagnostic, Result, Warned};
-use crate::format::{self, FirstFrame, Kind, MeshFormat};
+use crate::format::cache::CacheSource;
+use crate::format::{self, CacheFormat, FirstFrame, Kind, MeshFormat};
 use crate::mesh::Sequence;
 use crate::task::Task;
 use crate::world::World;
@@ -45,9 +46,9 @@ pub struct Origin {
 /// one connectivity. Cancellation.
 pub fn open(world: &dyn World, spec: &InputSpec, task: &Task) -> Result<Warned<Capture>> {
     let files = input::find(world, spec)?;
-    task.phase("load", files.paths.len());
     let (sequence, origin) = match files.format.kind {
         Kind::Mesh(format) => read_meshes(world, spec, &files, format, task)?,
+        Kind::Cache(format) => read_cache(world, spec, &files, format, task)?,
     };
     let fps = spec.fps.or(crate::mesh::FrameSource::fps(&sequence));
     Ok(Warned {
@@ -75,6 +76,7 @@ fn read_meshes(
     }
     let range = spec.range.unwrap_or_default().within(files.paths.len())?;
     let paths = &files.paths[range];
+    task.phase("load", paths.len());
     let mut bytes = 0;
     for path in paths {
         bytes += world.identity(path)?.map_or(0, |found| found.length);
@@ -98,6 +100,126 @@ fn read_meshes(
         bytes,
     };
     Ok((Sequence::new(first.topology, positions, first.fps), origin))
+}
+
+/// One cache with the faces of a mesh.
+fn read_cache(
+    world: &dyn World,
+    spec: &InputSpec,
+    files: &Files,
+    format: &dyn CacheFormat,
+    task: &Task,
+) -> Result<(Sequence, Origin)> {
+    let [path] = files.paths.as_slice() else {
+        return Diagnostic::error("several caches are not one capture")
+            .in_file(&files.paths[1])
+            .hint("choose one of them")
+            .err();
+    };
+    let Some(mesh) = spec.mesh.as_ref().or(files.mesh.as_ref()) else {
+        return Diagnostic::error(format!("a {} cache has no faces", files.format.name))
+            .in_file(path)
+            .hint("name the mesh they come from: --mesh BASE.obj")
+            .err();
+    };
+    let source = CacheFile::open(world, path)?;
+    let header = format.header(&source);
+    let header = header.map_err(|error| source.in_file(error))?;
+    let base = base_mesh(world, mesh)?;
+    if base.topology.vertices() != header.vertices {
+        return Diagnostic::error(format!(
+            "{} points a frame, but {} has {} vertices",
+            header.vertices,
+            mesh.display(),
+            base.topology.vertices()
+        ))
+        .in_file(path)
+        .hint("the mesh must be the one that the cache was made from")
+        .err();
+    }
+    let range = spec.range.unwrap_or_default().within(header.frames)?;
+    task.phase("load", range.len());
+    let width = 3 * header.vertices;
+    let mut positions = vec![0.0; width * range.len()];
+    let frames = positions.chunks_exact_mut(width).zip(range);
+    let lanes = lanes::within(READ_AHEAD, header.frame_bytes());
+    lanes::run(
+        frames,
+        lanes,
+        task,
+        |buffer: &mut Vec<u8>, (target, frame)| {
+            buffer.resize(4 * width, 0);
+            let start = header.start + frame as u64 * header.frame_bytes();
+            world.read_range(path, start, buffer)?;
+            format.decode(buffer, target);
+            finite(target, frame).map_err(|error| source.in_file(error))
+        },
+    )?;
+    let origin = Origin {
+        format: files.format.name,
+        files: vec![path.clone(), mesh.clone()],
+        bytes: source.length,
+    };
+    Ok((Sequence::new(base.topology, positions, header.fps), origin))
+}
+
+/// Refuses coordinates of `frame` (from 0) that are not finite.
+pub(super) fn finite(positions: &[f32], frame: usize) -> Result<()> {
+    match positions.iter().position(|value| !value.is_finite()) {
+        None => Ok(()),
+        Some(at) => Diagnostic::error("a coordinate is not a finite number")
+            .at_frame(frame + 1)
+            .at_vertex(at / 3 + 1)
+            .hint("leave the frame out (--range) or export it again")
+            .err(),
+    }
+}
+
+/// The mesh of a cache.
+fn base_mesh(world: &dyn World, path: &Path) -> Result<FirstFrame> {
+    let format = input::format_of(path)?;
+    match format.kind {
+        Kind::Mesh(format) => first_frame(world, path, format),
+        _ => Diagnostic::error(format!("a {} file is not a mesh", format.name))
+            .in_file(path)
+            .hint("name an OBJ or PLY file")
+            .err(),
+    }
+}
+
+/// A cache in the world.
+struct CacheFile<'a> {
+    world: &'a dyn World,
+    path: &'a Path,
+    length: u64,
+}
+
+impl<'a> CacheFile<'a> {
+    fn open(world: &'a dyn World, path: &'a Path) -> Result<Self> {
+        let length = world.identity(path)?.map_or(0, |found| found.length);
+        Ok(CacheFile {
+            world,
+            path,
+            length,
+        })
+    }
+
+    /// Adds the file to what its format said, and what the file seems to be instead.
+    fn in_file(&self, error: Box<Diagnostic>) -> Box<Diagnostic> {
+        let mut head = vec![0; usize::try_from(self.length.min(64)).unwrap_or(0)];
+        let _ = self.world.read_range(self.path, 0, &mut head);
+        in_file(error, self.path, &head)
+    }
+}
+
+impl CacheSource for CacheFile<'_> {
+    fn length(&self) -> u64 {
+        self.length
+    }
+
+    fn read(&self, offset: u64, bytes: &mut [u8]) -> Result<()> {
+        self.world.read_range(self.path, offset, bytes)
+    }
 }
 
 /// Files that are read at the same time hold at most this many bytes more than the frames themselves.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::input::{format_of, parent};
 use crate::diag::{Diagnostic, Result};
-use crate::format::{Format, Kind};
+use crate::format::{Encoding, Format, Kind};
 use crate::world::World;
 
 /// OUT, and the files that must not be written over.
@@ -15,18 +15,27 @@ pub struct Output {
     pub path: PathBuf,
     /// The inputs: writing over one of them is refused.
     pub inputs: Vec<PathBuf>,
+    /// How numbers are laid out, in formats that leave the choice (PLY).
+    pub encoding: Encoding,
 }
 
 impl<P: Into<PathBuf>> From<P> for Output {
     fn from(path: P) -> Self {
         Output {
             path: path.into(),
-            inputs: Vec::new(),
+            ..Output::default()
         }
     }
 }
 
 impl Output {
+    /// Lays numbers out like this.
+    #[must_use]
+    pub fn encoded(mut self, encoding: Encoding) -> Self {
+        self.encoding = encoding;
+        self
+    }
+
     /// Refuses to write over `inputs`.
     #[must_use]
     pub fn protecting(mut self, inputs: &[PathBuf]) -> Self {
@@ -107,6 +116,13 @@ fn plan_writes(world: &dyn World, out: &Path, frames: usize) -> Result<Plan> {
         None => return one_file(out, frames),
     };
     let format = format_of(&pattern.path(1))?;
+    if !matches!(format.kind, Kind::Mesh(_)) {
+        let name = format.name;
+        return Diagnostic::error(format!("one {name} file holds all frames"))
+            .in_file(out)
+            .hint("leave the number out of the name")
+            .err();
+    }
     let writes = (1..=frames as u64).map(|frame| pattern.path(frame));
     let mut removals: Vec<_> = pattern
         .files(world)

@@ -2,12 +2,13 @@
 
 use std::io;
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use super::lanes;
+use super::open::finite;
 use super::output::{Output, Plan, plan};
 use crate::diag::{Diagnostic, Result};
-use crate::format::{Kind, MeshFormat};
+use crate::format::cache::CacheHeader;
+use crate::format::{CacheFormat, FrameWriter, Kind, WriteOptions};
 use crate::mesh::FrameSource;
 use crate::task::Task;
 use crate::world::{Stage, World};
@@ -42,7 +43,15 @@ pub fn save(
     let stage = world.stage(&plan.stage)?;
     task.phase("write", frames);
     match plan.format.0.kind {
-        Kind::Mesh(format) => write_meshes(&*stage, source, format, task)?,
+        Kind::Mesh(format) => {
+            let options = WriteOptions {
+                fps: source.fps(),
+                encoding: output.encoding,
+            };
+            let writer = format.writer(source.topology(), options);
+            write_meshes(&*stage, source, &*writer, task)?;
+        }
+        Kind::Cache(format) => write_cache(&*stage, source, format, task)?,
     }
     task.check()?;
     let names = (0..plan.writes.len()).map(|file| file.to_string());
@@ -62,11 +71,9 @@ pub fn save(
 fn write_meshes(
     stage: &dyn Stage,
     source: &dyn FrameSource,
-    format: &dyn MeshFormat,
+    writer: &dyn FrameWriter,
     task: &Task,
 ) -> Result<()> {
-    let topology: &Arc<_> = source.topology();
-    let writer = format.writer(topology, source.fps());
     let lanes = rayon::current_num_threads();
     lanes::run(
         0..source.frames(),
@@ -80,6 +87,49 @@ fn write_meshes(
     )
 }
 
+/// One file; frames are fetched and encoded a batch at a time in parallel and written in order.
+fn write_cache(
+    stage: &dyn Stage,
+    source: &dyn FrameSource,
+    format: &dyn CacheFormat,
+    task: &Task,
+) -> Result<()> {
+    let header = CacheHeader {
+        vertices: source.topology().vertices(),
+        frames: source.frames(),
+        fps: source.fps(),
+        start: 0,
+    };
+    let mut file = stage.create("0")?;
+    let written = |done: io::Result<()>| done.map_err(|error| stage.failure(&error));
+    written(file.write_all(&format.encode_header(&header)?))?;
+    let frames: Vec<usize> = (0..header.frames).collect();
+    let mut batch: Vec<(Vec<f32>, Vec<u8>)> = Vec::new();
+    let fit = WRITE_BEHIND / (2 * header.frame_bytes()).max(1);
+    batch.resize_with(fit.clamp(1, 64) as usize, Default::default);
+    for frames in frames.chunks(batch.len()) {
+        let lanes = rayon::current_num_threads();
+        let items = frames.iter().zip(&mut batch);
+        lanes::run(
+            items,
+            lanes,
+            task,
+            |(): &mut (), (&frame, (positions, bytes))| {
+                fetch(source, frame, positions)?;
+                format.encode(positions, bytes);
+                Ok(())
+            },
+        )?;
+        for (_, bytes) in &batch[..frames.len()] {
+            written(file.write_all(bytes))?;
+        }
+    }
+    written(file.flush())
+}
+
+/// Frames that wait to be written hold at most this many bytes, unless one alone is longer.
+const WRITE_BEHIND: u64 = 16 << 20;
+
 /// The coordinates of one frame (from 0), finite.
 fn fetch(source: &dyn FrameSource, frame: usize, positions: &mut Vec<f32>) -> Result<()> {
     positions.resize(3 * source.topology().vertices(), 0.0);
@@ -88,11 +138,5 @@ fn fetch(source: &dyn FrameSource, frame: usize, positions: &mut Vec<f32>) -> Re
         let told = Diagnostic::error(format!("the frame cannot be fetched: {error}"));
         Box::new(told.at_frame(frame + 1))
     })?;
-    match positions.iter().position(|value| !value.is_finite()) {
-        None => Ok(()),
-        Some(at) => Diagnostic::error("a coordinate is not a finite number")
-            .at_frame(frame + 1)
-            .at_vertex(at / 3 + 1)
-            .err(),
-    }
+    finite(positions, frame)
 }

@@ -35,6 +35,7 @@ pub(super) fn read(bytes: &[u8], name: &str) -> Result<FirstFrame> {
         topology: Arc::new(topology.with_attributes(scan.attributes)),
         positions,
         fps: scan.fps,
+        layout: String::new(),
         runs,
     })
 }

@@ -12,7 +12,7 @@ mod write;
 
 use std::sync::Arc;
 
-use super::{FirstFrame, FrameWriter, MeshFormat};
+use super::{FirstFrame, FrameWriter, MeshFormat, WriteOptions};
 use crate::diag::Result;
 use crate::mesh::Topology;
 
@@ -28,7 +28,7 @@ impl MeshFormat for Obj {
         next::read(bytes, first, positions)
     }
 
-    fn writer(&self, topology: &Arc<Topology>, fps: Option<f64>) -> Box<dyn FrameWriter> {
-        Box::new(write::ObjWriter::new(topology, fps))
+    fn writer(&self, topology: &Arc<Topology>, options: WriteOptions) -> Box<dyn FrameWriter> {
+        Box::new(write::ObjWriter::new(topology, options.fps))
     }
 }

@@ -4,7 +4,7 @@
 use std::io::Write;
 use std::sync::Arc;
 
-use crate::format::FrameWriter;
+use crate::format::{FrameWriter, shortest};
 use crate::mesh::{GroupKind, Topology};
 
 /// Writes frames of one connectivity.
@@ -39,12 +39,6 @@ impl FrameWriter for ObjWriter {
         }
         out.extend_from_slice(&self.tail);
     }
-}
-
-/// The shortest digits that read back as `value`, without `.0`.
-fn shortest(digits: &mut zmij::Buffer, value: f32) -> &[u8] {
-    let text = digits.format(value).as_bytes();
-    text.strip_suffix(b".0").unwrap_or(text)
 }
 
 fn head(topology: &Topology, fps: Option<f64>) -> Vec<u8> {
