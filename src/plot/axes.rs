@@ -212,7 +212,7 @@ impl Plane {
         scene.write(&name, [middle, below], Anchor::Middle, theme);
     }
 
-    /// Writes numbers and, where it fits, the name left of the area.
+    /// Writes numbers left of the area and, where it fits, the name at the left side of the picture.
     pub(super) fn draw_y(&self, scene: &mut Scene, theme: &Theme, ticks: &Ticks, name: &str) {
         let size = theme.text;
         let right = self.area.left - 0.4 * size;
@@ -221,10 +221,9 @@ impl Plane {
             scene.write(&tick.text, at, Anchor::End, theme);
         }
         let middle = 0.5 * (self.area.top + self.area.bottom());
-        let left = right - ticks.width(size) - 0.65 * size;
         let name = ticks.named(name);
         if text_width(&name, size) <= self.area.height + size {
-            scene.write_upward(&name, [left, middle], theme);
+            scene.write_upward(&name, [1.05 * size, middle], theme);
         }
     }
 }
