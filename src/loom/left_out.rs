@@ -1,0 +1,168 @@
+//! The left-out error: what a fit is worth between frames. Every second frame is fitted with the same
+//! k/n, l/n and m, and measured at the frames between, beside linear blending and a cubic spline of every
+//! coordinate (C2, not-a-knot).
+//!
+//! All of it happens in reduced coordinates: any combination of frames is a row of n numbers, isometric
+//! to the frames themselves, so the frames are not read again.
+
+use super::ch12::Signals;
+use super::subspace::{Subspace, decomposed};
+use crate::diag::Result;
+use crate::math::cubic_spline::{CubicSpline, Ends};
+use crate::math::pca::{Pca, Table};
+use crate::task::Task;
+
+/// Relative errors at left-out frames, and where psi does worse than linear blending.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LeftOutFit {
+    /// Of the same kind of fit.
+    pub psi: f64,
+    /// Of linear blending between the two neighbours.
+    pub linear: f64,
+    /// Of a C2 cubic spline in every coordinate.
+    pub cubic: f64,
+    /// Left-out frames (from 1) whose error by psi exceeds that by linear blending.
+    pub worse: Vec<usize>,
+}
+
+/// Fits a method to a subspace with given k and l, clamped to what the subspace allows.
+pub type Method<'a> = &'a dyn Fn(&Subspace, usize, usize) -> Result<Signals>;
+
+/// Measures `method` at every second frame of `pca`'s rows; (k, l, m) are those of the fit to all frames.
+/// None below 5 frames: too little is left to fit or to measure.
+///
+/// # Errors
+/// The method's own; the task was cancelled.
+pub fn measure(
+    pca: &Pca,
+    fidelity: (usize, usize, usize),
+    method: Method<'_>,
+    task: &Task,
+) -> Result<Option<LeftOutFit>> {
+    if pca.rows() < 5 {
+        return Ok(None);
+    }
+    let halves = Halves::of(&pca.reduced(), pca.rows());
+    let psi = halves.errors(&halves.psi(fidelity, method, task)?);
+    let linear = halves.errors(&halves.linear());
+    let cubic = halves.errors(&halves.cubic());
+    let worse = (0..psi.len())
+        .filter(|&i| psi[i] > linear[i])
+        .map(|i| 2 * i + 2);
+    Ok(Some(LeftOutFit {
+        psi: halves.relative(&psi),
+        linear: halves.relative(&linear),
+        cubic: halves.relative(&cubic),
+        worse: worse.collect(),
+    }))
+}
+
+/// Frames 1, 3, 5, .. and, each between two of them, 2, 4, ..; rows of `width` numbers.
+struct Halves {
+    width: usize,
+    kept: Vec<f64>,
+    out: Vec<f64>,
+}
+
+impl Halves {
+    fn of(rows: &[f64], width: usize) -> Self {
+        let every_second = |first: usize| -> Vec<f64> {
+            let rows = rows.chunks_exact(width).skip(first).step_by(2);
+            rows.flatten().copied().collect()
+        };
+        let kept = every_second(0);
+        let mut out = every_second(1);
+        out.truncate(kept.len() - width);
+        Halves { width, kept, out }
+    }
+
+    /// Time of left-out frame `i` among those kept, which count from 1.
+    fn time(i: usize) -> f64 {
+        i as f64 + 1.5
+    }
+
+    fn count(&self) -> usize {
+        self.out.len() / self.width
+    }
+
+    /// Squared distances of the left-out frames from `rows`.
+    fn errors(&self, rows: &[f64]) -> Vec<f64> {
+        let pairs = self
+            .out
+            .chunks_exact(self.width)
+            .zip(rows.chunks_exact(self.width));
+        pairs
+            .map(|(a, b)| a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum())
+            .collect()
+    }
+
+    /// The root of the errors' sum over that of the left-out frames' squared distances from their mean;
+    /// 0 where those do not move.
+    fn relative(&self, errors: &[f64]) -> f64 {
+        let count = self.count();
+        let mut mean = vec![0.0; self.width];
+        for row in self.out.chunks_exact(self.width) {
+            mean.iter_mut()
+                .zip(row)
+                .for_each(|(mean, z)| *mean += z / count as f64);
+        }
+        let whole: f64 = self.errors(&mean.repeat(count)).iter().sum();
+        if whole > 0.0 {
+            (errors.iter().sum::<f64>() / whole).sqrt()
+        } else {
+            0.0
+        }
+    }
+
+    fn linear(&self) -> Vec<f64> {
+        let before = self.kept.iter();
+        let after = self.kept[self.width..].iter();
+        before.zip(after).map(|(a, b)| 0.5 * (a + b)).collect()
+    }
+
+    fn cubic(&self) -> Vec<f64> {
+        let knots: Vec<f64> = (0..self.kept.len() / self.width)
+            .map(|i| 1.0 + i as f64)
+            .collect();
+        let mut rows = vec![0.0; self.out.len()];
+        // knots rise by one and the counts match, so there is a spline
+        if let Ok(spline) = CubicSpline::new(&knots, &self.kept, self.width, Ends::NotAKnot) {
+            for (i, row) in rows.chunks_exact_mut(self.width).enumerate() {
+                spline.evaluate(Halves::time(i), row);
+            }
+        }
+        rows
+    }
+
+    fn psi(
+        &self,
+        (controls, sites, modes): (usize, usize, usize),
+        method: Method<'_>,
+        task: &Task,
+    ) -> Result<Vec<f64>> {
+        let (n, half) = (self.width, self.kept.len() / self.width);
+        let share = |count: usize| (count * half + n / 2) / n;
+        // an interpolating time signal has two control points more than frames
+        let controls = if controls == n + 2 {
+            half + 2
+        } else {
+            share(controls)
+        };
+        let rows = Table::new(&self.kept, self.width);
+        let (pca, basis) = decomposed(&rows, modes.min(half - 1), task)?;
+        let signals = method(&Subspace::new(&pca, &basis), controls, share(sites))?;
+        let mut x = vec![0.0; basis.modes];
+        let mut found = Vec::with_capacity(self.out.len());
+        for i in 0..self.count() {
+            signals
+                .pose
+                .evaluate(signals.time.at(Halves::time(i)).unwrap_or_default(), &mut x);
+            let mut row = pca.mean().to_vec();
+            for (x, vector) in x.iter().zip(basis.vectors.chunks_exact(self.width)) {
+                row.iter_mut().zip(vector).for_each(|(z, h)| *z += x * h);
+            }
+            found.extend(row);
+        }
+        Ok(found)
+    }
+}

@@ -1,0 +1,151 @@
+//! What a fit says about itself: how well, with how much, and what should be known.
+
+use serde::{Deserialize, Serialize};
+
+use super::ch12::{self, Signals, passed};
+use super::left_out::LeftOutFit;
+use super::subspace::Subspace;
+use crate::math::b_spline::Point;
+
+/// The report of a fit; the first fields are the command line's JSON.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FitReport {
+    /// n, frames of the capture.
+    pub frames: usize,
+    /// V.
+    pub vertices: usize,
+    /// Polygons.
+    pub faces: usize,
+    /// The shape space's name.
+    pub space: String,
+    /// d, the shape space's dimension.
+    pub dimension: usize,
+    /// k, control points of the time signal; 0 where nothing moves.
+    pub controls: usize,
+    /// l, sites of the pose signal; 0 where nothing moves.
+    pub sites: usize,
+    /// m, modes of the shape signal.
+    pub modes: usize,
+    /// Frames per second, where known.
+    pub fps: Option<f64>,
+    /// Errors at the frames.
+    pub error: Errors,
+    /// Errors between frames; none where it was not asked for, or there are fewer than 5 frames.
+    pub left_out: Option<LeftOut>,
+    /// The layout's stress, relative: the root of (6) over sum ||x_i - x_j||^2.
+    pub stress: f64,
+    /// What should be known, one sentence each.
+    pub warnings: Vec<String>,
+    /// How it was fitted: "ch12" or "ordered".
+    pub method: String,
+    /// Positions that differ from the one before: the n of k/n and l/n.
+    pub distinct: usize,
+    /// k/n, l/n, m/n: how complicated, how little repetitive, how rich in shapes the motion is (CH12 §3.4).
+    pub share: Share,
+    /// Modes of the capture that are not rounding.
+    pub rank: usize,
+    /// How the layout ended.
+    pub layout: LayoutReport,
+    /// Positions so close that they are one site, and what that costs.
+    pub merged: Merged,
+}
+
+/// Relative errors at the frames: sqrt(sum ||.||^2) / sqrt(sum ||z_i - mean||^2).
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Errors {
+    /// ||z_i - h(x_i)||, by the modes left out.
+    pub shape: f64,
+    /// ||x_i - g(p_i)||, by the sites left out.
+    pub pose: f64,
+    /// |p_i - f(i)|, by the control points left out, relative to the spread of the positions.
+    pub time: f64,
+    /// ||z_i - psi(i)||.
+    pub total: f64,
+}
+
+/// Relative errors at left-out frames of fits to every second frame.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct LeftOut {
+    /// Of this kind of fit, with the same k/n, l/n, m.
+    pub psi: f64,
+    /// Of linear blending.
+    pub linear: f64,
+    /// Of a cubic spline in every coordinate.
+    pub cubic: f64,
+}
+
+/// Numbers kept per frame.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Share {
+    /// k/n.
+    pub controls: f64,
+    /// l/n.
+    pub sites: f64,
+    /// m/n.
+    pub modes: f64,
+}
+
+/// How a layout ended.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct LayoutReport {
+    /// Guttman transforms.
+    pub steps: usize,
+    /// Whether the stress stood still within the steps allowed.
+    pub converged: bool,
+    /// Frames whose position is held by a pin.
+    pub pinned: usize,
+}
+
+/// Positions closer than 1e-4 of the layout's diameter share a site.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Merged {
+    /// Frames that share another's site.
+    pub frames: usize,
+    /// Largest error that this makes, relative like the errors: what exactness can reach.
+    pub error: f64,
+}
+
+impl Errors {
+    /// Measures signals at the frames of a subspace.
+    pub fn measure(subspace: &Subspace, signals: &Signals) -> Self {
+        let positions = &signals.layout.positions;
+        let passed = passed(&signals.time);
+        let pose = ch12::misfit(subspace, &signals.pose, positions, f64::INFINITY);
+        let total = ch12::misfit(subspace, &signals.pose, &passed, f64::INFINITY);
+        let shape = subspace.residual;
+        Errors {
+            shape: subspace.relative(shape),
+            pose: subspace.relative(pose.sqrt()),
+            time: time_error(positions, &passed),
+            total: subspace.relative((shape * shape + total).sqrt()),
+        }
+    }
+}
+
+impl From<&LeftOutFit> for LeftOut {
+    fn from(fit: &LeftOutFit) -> Self {
+        LeftOut {
+            psi: fit.psi,
+            linear: fit.linear,
+            cubic: fit.cubic,
+        }
+    }
+}
+
+/// sqrt(sum |p_i - f(i)|^2) relative to the positions' spread about their mean; 0 where that is 0.
+fn time_error(positions: &[Point], passed: &[Point]) -> f64 {
+    let n = positions.len() as f64;
+    let mean: Point = [0, 1].map(|axis| positions.iter().map(|p| p[axis]).sum::<f64>() / n);
+    let square = |p: &Point, q: &Point| (p[0] - q[0]).powi(2) + (p[1] - q[1]).powi(2);
+    let spread: f64 = positions.iter().map(|p| square(p, &mean)).sum();
+    let miss: f64 = positions
+        .iter()
+        .zip(passed)
+        .map(|(p, q)| square(p, q))
+        .sum();
+    if spread > 0.0 {
+        (miss / spread).sqrt()
+    } else {
+        0.0
+    }
+}
