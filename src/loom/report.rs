@@ -7,8 +7,10 @@ use super::left_out::LeftOutFit;
 use super::subspace::Subspace;
 use crate::math::b_spline::Point;
 
-/// The report of a fit; the first fields are the command line's JSON.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// The report of a fit; the first fields are the command line's JSON. Zeros and nothing for a loom that
+/// was not fitted.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct FitReport {
     /// n, frames of the capture.
     pub frames: usize,
@@ -52,6 +54,7 @@ pub struct FitReport {
 
 /// Relative errors at the frames: sqrt(sum ||.||^2) / sqrt(sum ||z_i - mean||^2).
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Errors {
     /// ||z_i - h(x_i)||, by the modes left out.
     pub shape: f64,
@@ -64,7 +67,8 @@ pub struct Errors {
 }
 
 /// Relative errors at left-out frames of fits to every second frame.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct LeftOut {
     /// Of this kind of fit, with the same k/n, l/n, m.
     pub psi: f64,
@@ -75,7 +79,8 @@ pub struct LeftOut {
 }
 
 /// Numbers kept per frame.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Share {
     /// k/n.
     pub controls: f64,
@@ -86,7 +91,8 @@ pub struct Share {
 }
 
 /// How a layout ended.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct LayoutReport {
     /// Guttman transforms.
     pub steps: usize,
@@ -97,7 +103,8 @@ pub struct LayoutReport {
 }
 
 /// Positions closer than 1e-4 of the layout's diameter share a site.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Merged {
     /// Frames that share another's site.
     pub frames: usize,
