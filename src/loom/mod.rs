@@ -2,6 +2,7 @@
 
 pub mod ch12;
 pub mod fidelity;
+pub mod file;
 pub mod fit;
 pub mod frames;
 pub mod left_out;
@@ -9,3 +10,597 @@ pub mod pins;
 pub mod report;
 pub mod subspace;
 pub mod warnings;
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Matrix3, Vector3};
+
+use crate::diag::{Diagnostic, Result};
+use crate::math::b_spline::Point;
+use crate::mesh::Topology;
+use crate::signal::pose::PoseSignal;
+use crate::signal::root::RootSignal;
+use crate::signal::shape::ShapeSignal;
+use crate::signal::time::TimeSignal;
+use crate::space::ShapeSpace;
+
+pub use report::{Errors, FitReport, LeftOut};
+
+/// Coordinates evaluated at a time: they stay in the cache between the shape signal, the root motion and
+/// the store. A multiple of 3.
+const BLOCK: usize = 3072;
+
+/// What the signals were fitted to: the frames' places in pose space and in the shape subspace. Edits of
+/// time leave it alone.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Layout {
+    /// p_i, n points.
+    pub positions: Vec<Point>,
+    /// x_i, n rows of m.
+    pub coordinates: Vec<f64>,
+    /// Frames (from 0) that were put where they are.
+    pub pins: Vec<(usize, Point)>,
+}
+
+/// The parts of a loom. Looms that share parts share their memory.
+#[derive(Clone)]
+pub struct Parts {
+    /// Faces, and what is carried along.
+    pub topology: Arc<Topology>,
+    /// Frames per second, where it is known.
+    pub fps: Option<f64>,
+    /// The shape space S, of dimension d.
+    pub space: Arc<dyn ShapeSpace>,
+    /// h, from R^m to S.
+    pub shape: Arc<ShapeSignal>,
+    /// g, from R^2 to R^m.
+    pub pose: Arc<PoseSignal>,
+    /// f, from time to R^2.
+    pub time: Arc<TimeSignal>,
+    /// Root motion, on the time of f before its changes of time.
+    pub root: Option<Arc<RootSignal>>,
+    /// What the signals were fitted to.
+    pub layout: Arc<Layout>,
+    /// What the fit said about itself.
+    pub report: Arc<FitReport>,
+}
+
+/// psi = h o g o f. Immutable; edits make new looms that share what they do not change.
+#[derive(Clone)]
+pub struct Loom {
+    parts: Parts,
+}
+
+/// Memory for evaluating one frame after another.
+#[derive(Debug, Clone, Default)]
+pub struct Scratch {
+    x: Vec<f64>,
+    z: Vec<f64>,
+    positions: Vec<f64>,
+}
+
+impl Loom {
+    /// A loom of its parts.
+    ///
+    /// # Errors
+    /// Parts that do not fit each other: dimensions of space, h and g; frames of root
+    /// and time; a layout with other counts; a frame rate that is not positive.
+    pub fn new(parts: Parts) -> Result<Self> {
+        let (d, m) = (parts.shape.dimension(), parts.shape.modes());
+        let layout = &parts.layout;
+        let n = layout.positions.len();
+        let pinned = layout.pins.iter().all(|(frame, _)| *frame < n);
+        let placed = parts.pose.site_frames().iter().all(|frame| *frame < n);
+        let checks = [
+            (
+                parts.space.dimension() == d,
+                "the shape signal is not of the shape space",
+            ),
+            (
+                parts.pose.modes() == m,
+                "the pose signal is not of the shape subspace",
+            ),
+            (
+                layout.coordinates.len() == n * m && pinned,
+                "the layout has other counts",
+            ),
+            (
+                placed,
+                "a site of the pose signal is at a frame that does not exist",
+            ),
+            (
+                parts
+                    .root
+                    .as_ref()
+                    .is_none_or(|r| r.frames().len() == parts.time.places().len()),
+                "the root motion has another number of frames than the time signal",
+            ),
+            (
+                parts.fps.is_none_or(|fps| fps > 0.0 && fps.is_finite()),
+                "the frame rate is not a positive number",
+            ),
+        ];
+        match checks.iter().find(|(holds, _)| !holds) {
+            Some((_, fault)) => Diagnostic::error(*fault).err(),
+            None => Ok(Loom { parts }),
+        }
+    }
+
+    /// The parts, for making another loom of.
+    pub fn parts(&self) -> Parts {
+        self.parts.clone()
+    }
+
+    /// Faces, and what is carried along.
+    pub fn topology(&self) -> &Arc<Topology> {
+        &self.parts.topology
+    }
+
+    /// Frames per second, where it is known.
+    pub fn fps(&self) -> Option<f64> {
+        self.parts.fps
+    }
+
+    /// The shape space.
+    pub fn space(&self) -> &Arc<dyn ShapeSpace> {
+        &self.parts.space
+    }
+
+    /// h.
+    pub fn shape(&self) -> &Arc<ShapeSignal> {
+        &self.parts.shape
+    }
+
+    /// g.
+    pub fn pose(&self) -> &Arc<PoseSignal> {
+        &self.parts.pose
+    }
+
+    /// f.
+    pub fn time(&self) -> &Arc<TimeSignal> {
+        &self.parts.time
+    }
+
+    /// Root motion.
+    pub fn root(&self) -> Option<&Arc<RootSignal>> {
+        self.parts.root.as_ref()
+    }
+
+    /// What the signals were fitted to.
+    pub fn layout(&self) -> &Arc<Layout> {
+        &self.parts.layout
+    }
+
+    /// What the fit said about itself.
+    pub fn report(&self) -> &Arc<FitReport> {
+        &self.parts.report
+    }
+
+    /// n: time runs over \[1, n\].
+    pub fn frames(&self) -> usize {
+        self.parts.time.frames()
+    }
+
+    /// The loom with another time signal over the same frames of root motion.
+    ///
+    /// # Errors
+    /// There is root motion, and it has another number of frames.
+    pub fn with_time(&self, time: TimeSignal) -> Result<Self> {
+        Loom::new(Parts {
+            time: Arc::new(time),
+            ..self.parts()
+        })
+    }
+
+    /// The loom with another pose signal.
+    ///
+    /// # Errors
+    /// It is not of the shape subspace.
+    pub fn with_pose(&self, pose: PoseSignal) -> Result<Self> {
+        Loom::new(Parts {
+            pose: Arc::new(pose),
+            ..self.parts()
+        })
+    }
+
+    /// The loom at another frame rate.
+    ///
+    /// # Errors
+    /// The rate is not a positive number.
+    pub fn with_fps(&self, fps: Option<f64>) -> Result<Self> {
+        Loom::new(Parts {
+            fps,
+            ..self.parts()
+        })
+    }
+
+    /// f(t), the place in pose space.
+    ///
+    /// # Errors
+    /// `t` lies outside \[1, n\].
+    pub fn position_at(&self, t: f64) -> Result<Point> {
+        self.parts.time.at(t).ok_or_else(|| self.outside(t))
+    }
+
+    /// g(f(t)), m coordinates in the shape subspace.
+    ///
+    /// # Errors
+    /// `t` lies outside \[1, n\].
+    pub fn coordinates_at(&self, t: f64) -> Result<Vec<f64>> {
+        let mut x = vec![0.0; self.parts.shape.modes()];
+        self.parts.pose.evaluate(self.position_at(t)?, &mut x);
+        Ok(x)
+    }
+
+    /// h(g(f(t))), d coordinates in the shape space.
+    ///
+    /// # Errors
+    /// `t` lies outside \[1, n\].
+    pub fn shape_at(&self, t: f64) -> Result<Vec<f64>> {
+        let x = self.coordinates_at(t)?;
+        let mut z = vec![0.0; self.parts.shape.dimension()];
+        self.parts.shape.evaluate(&x, &mut z);
+        Ok(z)
+    }
+
+    /// The rigid motion at `t` that was split off; the identity where none was.
+    ///
+    /// # Errors
+    /// `t` lies outside \[1, n\].
+    pub fn root_at(&self, t: f64) -> Result<Isometry3<f64>> {
+        let (source, _) = self
+            .parts
+            .time
+            .source_time(t)
+            .ok_or_else(|| self.outside(t))?;
+        Ok(self
+            .parts
+            .root
+            .as_ref()
+            .map_or_else(Isometry3::identity, |root| root.at(source)))
+    }
+
+    /// psi(t): 3V coordinates.
+    ///
+    /// # Errors
+    /// `t` lies outside \[1, n\].
+    pub fn at(&self, t: f64) -> Result<Vec<f32>> {
+        let mut positions = vec![0.0; 3 * self.parts.topology.vertices()];
+        self.evaluate(t, &mut Scratch::default(), &mut positions)?;
+        Ok(positions)
+    }
+
+    /// Writes psi(t), 3V coordinates, to `positions`.
+    ///
+    /// # Errors
+    /// `t` lies outside \[1, n\].
+    ///
+    /// # Panics
+    /// `positions` is not 3V long.
+    pub fn evaluate(&self, t: f64, scratch: &mut Scratch, positions: &mut [f32]) -> Result<()> {
+        let p = self.position_at(t)?;
+        let motion = match &self.parts.root {
+            Some(_) => Some(self.root_at(t)?),
+            None => None,
+        };
+        self.decode(p, motion, scratch, positions);
+        Ok(())
+    }
+
+    /// The shape at a point of the map, g of it decoded, without root motion: 3V coordinates.
+    ///
+    /// # Errors
+    /// `p` is not finite.
+    pub fn pose_at(&self, p: Point) -> Result<Vec<f32>> {
+        if !(p[0].is_finite() && p[1].is_finite()) {
+            return Diagnostic::error("the point of the map is not finite").err();
+        }
+        let mut positions = vec![0.0; 3 * self.parts.topology.vertices()];
+        self.decode(p, None, &mut Scratch::default(), &mut positions);
+        Ok(positions)
+    }
+
+    /// psi'(t), 3V numbers, coordinates per frame. Analytic through rho, f~, g, h and the root motion;
+    /// where the space is not linear, a central difference along the shape's own change takes it through
+    /// the decoding.
+    ///
+    /// # Errors
+    /// `t` lies outside \[1, n\].
+    pub fn velocity(&self, t: f64) -> Result<Vec<f64>> {
+        let Parts {
+            time, pose, shape, ..
+        } = &self.parts;
+        let (p, v) = time
+            .at(t)
+            .zip(time.velocity(t))
+            .ok_or_else(|| self.outside(t))?;
+        let (mut x, mut dx) = (vec![0.0; shape.modes()], vec![0.0; shape.modes()]);
+        pose.evaluate(p, &mut x);
+        pose.along(p, v, &mut dx);
+        let (mut z, mut dz) = (vec![0.0; shape.dimension()], vec![0.0; shape.dimension()]);
+        shape.evaluate(&x, &mut z);
+        shape.direction(&dx, &mut dz);
+        let (positions, mut velocity) = self.decode_with_change(&z, &dz);
+        let source = time.source_time(t);
+        if let (Some(root), Some((source, rate))) = (&self.parts.root, source) {
+            let frame = root.frame_at(source);
+            let turn = frame.rotation.to_rotation_matrix();
+            for (p, v) in positions.chunks_exact(3).zip(velocity.chunks_exact_mut(3)) {
+                let arm = Vector3::from_column_slice(p) - root.pivot();
+                let turned = frame.spin.cross(&arm) * rate + Vector3::from_column_slice(v);
+                v.copy_from_slice((turn * turned + frame.slope * rate).as_slice());
+            }
+        }
+        Ok(velocity)
+    }
+
+    /// Positions of coordinates `z` and how they change with `dz`.
+    fn decode_with_change(&self, z: &[f64], dz: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let space = &self.parts.space;
+        if space.is_identity() {
+            return (z.to_vec(), dz.to_vec());
+        }
+        let norm = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let decoded = |step: f64| {
+            let moved: Vec<f64> = z.iter().zip(dz).map(|(z, dz)| z + step * dz).collect();
+            let mut positions = vec![0.0; 3 * self.parts.topology.vertices()];
+            space.decode(&moved, &mut positions);
+            positions
+        };
+        let speed = norm(dz);
+        if speed == 0.0 {
+            let positions = decoded(0.0);
+            let still = vec![0.0; positions.len()];
+            return (positions, still);
+        }
+        // Half the digits: truncation h^2 and rounding 1e-16 / h are about equal at 1e-5.
+        let h = 1e-5 * norm(z).max(speed) / speed;
+        let (before, after) = (decoded(-h), decoded(h));
+        let change = before.iter().zip(&after).map(|(a, b)| (b - a) / (2.0 * h));
+        (decoded(0.0), change.collect())
+    }
+
+    /// Writes the shape at `p`, moved by `motion`.
+    fn decode(
+        &self,
+        p: Point,
+        motion: Option<Isometry3<f64>>,
+        scratch: &mut Scratch,
+        positions: &mut [f32],
+    ) {
+        let Parts {
+            space, pose, shape, ..
+        } = &self.parts;
+        let motion = motion.map(Motion::new);
+        scratch.x.resize(shape.modes(), 0.0);
+        pose.evaluate(p, &mut scratch.x);
+        if space.is_identity() {
+            scratch.z.resize(BLOCK, 0.0);
+            for (block, out) in positions.chunks_mut(BLOCK).enumerate() {
+                let z = &mut scratch.z[..out.len()];
+                shape.evaluate_from(block * BLOCK, &scratch.x, z);
+                store(z, motion.as_ref(), out);
+            }
+            return;
+        }
+        scratch.z.resize(shape.dimension(), 0.0);
+        scratch.positions.resize(positions.len(), 0.0);
+        shape.evaluate(&scratch.x, &mut scratch.z);
+        space.decode(&scratch.z, &mut scratch.positions);
+        store(&mut scratch.positions, motion.as_ref(), positions);
+    }
+
+    fn outside(&self, t: f64) -> Box<Diagnostic> {
+        let n = self.frames();
+        let error = Diagnostic::error(format!("time {t} lies outside [1, {n}]"));
+        Box::new(error.hint("frames are counted from 1; `extend` continues a loom past its end"))
+    }
+}
+
+/// A rigid motion as the nine numbers that positions are multiplied with.
+struct Motion {
+    turn: Matrix3<f64>,
+    shift: Vector3<f64>,
+}
+
+impl Motion {
+    fn new(motion: Isometry3<f64>) -> Self {
+        Motion {
+            turn: motion.rotation.to_rotation_matrix().into_inner(),
+            shift: motion.translation.vector,
+        }
+    }
+}
+
+/// Moves positions and rounds them to single precision.
+fn store(z: &mut [f64], motion: Option<&Motion>, out: &mut [f32]) {
+    if let Some(Motion { turn, shift }) = motion {
+        for p in z.chunks_exact_mut(3) {
+            let moved = turn * Vector3::new(p[0], p[1], p[2]) + shift;
+            p.copy_from_slice(moved.as_slice());
+        }
+    }
+    for (out, z) in out.iter_mut().zip(z) {
+        *out = *z as f32;
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod test_looms {
+    use super::*;
+    use crate::math::thin_plate::Rows;
+    use crate::signal::root::RootKind;
+    use crate::space::Vertices;
+
+    /// A made-up motion of `vertices` vertices over n frames: three modes over a ring of poses, in the
+    /// space of vertices, interpolated where `exact`.
+    pub(crate) fn ring(vertices: usize, n: usize, exact: bool) -> Loom {
+        let (m, d) = (3, 3 * vertices);
+        let angle = |i: usize| 0.31 * i as f64;
+        let positions: Vec<Point> = (0..n)
+            .map(|i| [libm::cos(angle(i)), libm::sin(1.1 * angle(i))])
+            .collect();
+        let coordinates: Vec<f64> = (0..n)
+            .flat_map(|i| [1.0, 2.0, 3.0].map(|j| libm::sin(j * angle(i)) / j))
+            .collect();
+        let rows = Rows {
+            positions: &positions,
+            targets: &coordinates,
+            width: m,
+            weights: None,
+        };
+        let (sites, controls) = if exact {
+            (n, n + 2)
+        } else {
+            (n / 2, (2 * n).div_ceil(3))
+        };
+        let pose = PoseSignal::fit(&rows, sites)
+            .expect("rows are sound")
+            .signal;
+        let time = TimeSignal::fit(&positions, controls, 0.5).expect("controls are possible");
+        let wave = |i: usize, by: f64| libm::sin(by * i as f64) + 0.1 * (i % 7) as f64;
+        let offset: Vec<f64> = (0..d).map(|i| wave(i, 0.7)).collect();
+        let vectors = (0..m * d)
+            .map(|i| wave(i, 1.3) / (d as f64).sqrt())
+            .collect();
+        let faces: Vec<[u32; 3]> = (2..vertices as u32).map(|i| [0, i - 1, i]).collect();
+        let parts = Parts {
+            topology: Arc::new(
+                Topology::from_triangles(vertices, &faces).expect("faces are sound"),
+            ),
+            fps: Some(24.0),
+            space: Arc::new(Vertices::new(vertices)),
+            shape: Arc::new(ShapeSignal::new(offset, vectors, m).expect("numbers are finite")),
+            pose: Arc::new(pose),
+            time: Arc::new(time),
+            root: None,
+            layout: Arc::new(Layout {
+                positions,
+                coordinates,
+                pins: vec![(2, [0.5, 0.25])],
+            }),
+            report: Arc::new(FitReport {
+                frames: n,
+                ..FitReport::default()
+            }),
+        };
+        Loom::new(parts).expect("parts fit")
+    }
+
+    /// The ring travelling over the ground and turning.
+    pub(crate) fn travelling(vertices: usize, n: usize) -> Loom {
+        let loom = ring(vertices, n, true);
+        let motions: Vec<_> = (0..n)
+            .map(|i| {
+                Isometry3::new(
+                    Vector3::new(0.5 * i as f64, 0.0, 0.1),
+                    Vector3::y() * (0.2 * i as f64),
+                )
+            })
+            .collect();
+        let root = RootSignal::through(RootKind::Ground, Vector3::new(0.1, 0.2, 0.3), &motions);
+        Loom::new(Parts {
+            root: Some(Arc::new(root.expect("motions are finite"))),
+            ..loom.parts()
+        })
+        .expect("parts fit")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::test_looms::{ring, travelling};
+    use super::*;
+
+    #[test]
+    fn every_frame_is_reproduced_when_nothing_is_left_out() {
+        let loom = ring(50, 30, true);
+        for (i, p) in loom.layout().positions.iter().enumerate() {
+            let t = (i + 1) as f64;
+            let found = loom.position_at(t).unwrap();
+            assert!((found[0] - p[0]).abs() < 1e-12 && (found[1] - p[1]).abs() < 1e-12);
+            let x = loom.coordinates_at(t).unwrap();
+            let target = &loom.layout().coordinates[3 * i..3 * i + 3];
+            assert!(x.iter().zip(target).all(|(a, b)| (a - b).abs() < 1e-9));
+        }
+    }
+
+    #[test]
+    fn positions_are_the_shape_moved_and_rounded_in_blocks_as_in_one() {
+        // more coordinates than two blocks
+        let loom = travelling(2100, 12);
+        let motion = loom.root_at(4.3).unwrap();
+        let z = loom.shape_at(4.3).unwrap();
+        let found = loom.at(4.3).unwrap();
+        for (p, q) in z.chunks_exact(3).zip(found.chunks_exact(3)) {
+            let moved = motion * nalgebra::Point3::new(p[0], p[1], p[2]);
+            for axis in 0..3 {
+                assert!(
+                    (moved[axis] - f64::from(q[axis])).abs() < 1e-6 * (1.0 + moved[axis].abs())
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn velocity_matches_central_differences() {
+        for loom in [ring(20, 25, false), travelling(20, 25)] {
+            let psi = |t: f64| -> Vec<f64> {
+                let motion = loom.root_at(t).unwrap();
+                let z = loom.shape_at(t).unwrap();
+                let points = z
+                    .chunks_exact(3)
+                    .map(|p| motion * nalgebra::Point3::new(p[0], p[1], p[2]));
+                points.flat_map(|p| [p.x, p.y, p.z]).collect()
+            };
+            let h = 1e-5;
+            for i in 0..70 {
+                let t = 1.1 + 0.331 * f64::from(i);
+                let (before, after) = (psi(t - h), psi(t + h));
+                let velocity = loom.velocity(t).unwrap();
+                let size = velocity.iter().fold(0.0, |a: f64, v| a.max(v.abs()));
+                for (v, (a, b)) in velocity.iter().zip(before.iter().zip(&after)) {
+                    assert!(((b - a) / (2.0 * h) - v).abs() < 1e-6 * size);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_map_gives_the_pose_without_root_motion() {
+        let (still, moving) = (ring(40, 20, true), travelling(40, 20));
+        let p = moving.position_at(7.0).unwrap();
+        assert_eq!(moving.pose_at(p).unwrap(), still.at(7.0).unwrap());
+        assert!(moving.pose_at([f64::NAN, 0.0]).is_err());
+    }
+
+    #[test]
+    fn times_outside_are_refused_with_the_range() {
+        let loom = ring(5, 10, true);
+        for t in [0.99, 10.01, f64::NAN, f64::INFINITY] {
+            let error = loom.at(t).unwrap_err();
+            assert!(error.message.contains("outside [1, 10]"), "{error}");
+            assert!(loom.velocity(t).is_err() && loom.root_at(t).is_err());
+        }
+    }
+
+    #[test]
+    fn parts_that_do_not_fit_are_refused() {
+        let loom = ring(5, 10, true);
+        let shape = ring(6, 10, true).shape().clone();
+        assert!(
+            Loom::new(Parts {
+                shape,
+                ..loom.parts()
+            })
+            .is_err()
+        );
+        assert!(loom.with_fps(Some(0.0)).is_err());
+        let moving = travelling(5, 10);
+        assert!(
+            moving
+                .with_time(ring(5, 11, true).time().as_ref().clone())
+                .is_err()
+        );
+    }
+}

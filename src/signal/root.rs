@@ -123,26 +123,6 @@ impl RootSignal {
         self.motion(rotation, position)
     }
 
-    /// Angular velocity (in space's axes, radians per frame) and velocity of q at time `t`.
-    pub fn velocity(&self, t: f64) -> (Vector3<f64>, Vector3<f64>) {
-        let (rotation, _, spin, slope) = self.state(t);
-        (rotation * spin, slope)
-    }
-
-    /// How a point moves: `velocity` of the shape without root motion at `point` of it, at time `t` that
-    /// passes at `rate`.
-    pub fn point_velocity(
-        &self,
-        t: f64,
-        rate: f64,
-        point: Vector3<f64>,
-        velocity: Vector3<f64>,
-    ) -> Vector3<f64> {
-        let (rotation, _, spin, slope) = self.state(t);
-        let turned = spin.cross(&(point - self.pivot)) * rate + velocity;
-        rotation * turned + slope * rate
-    }
-
     /// The motion of frame `index`, from 0.
     ///
     /// # Panics
@@ -179,7 +159,8 @@ impl RootSignal {
         RootSignal::new(self.kind, self.pivot, frames)
     }
 
-    /// The state at `t` as a frame: what is needed to cut there.
+    /// Motion and velocities at time `t`, kept within the frames. A point p of the shape without root
+    /// motion that moves with velocity v there moves with R (spin x (p - c) + v) + slope.
     pub fn frame_at(&self, t: f64) -> RootFrame {
         let (rotation, position, spin, slope) = self.state(t);
         RootFrame {
@@ -331,13 +312,16 @@ mod tests {
         for i in 0..100 {
             let t = 1.05 + 0.1 * f64::from(i);
             let difference = (at(t + h) - at(t - h)) / (2.0 * h);
-            let velocity = root.point_velocity(t, 1.0, point, Vector3::zeros());
+            let frame = root.frame_at(t);
+            let turned = frame.spin.cross(&(point - root.pivot()));
+            let velocity = frame.rotation * turned + frame.slope;
             assert!((difference - velocity).norm() < 1e-7 * (1.0 + velocity.norm()));
         }
         for frame in 2..12 {
             let t = f64::from(frame);
-            let (before, after) = (root.velocity(t - 1e-9), root.velocity(t + 1e-9));
-            assert!((before.0 - after.0).norm() < 1e-6 && (before.1 - after.1).norm() < 1e-6);
+            let (before, after) = (root.frame_at(t - 1e-9), root.frame_at(t + 1e-9));
+            assert!((before.spin - after.spin).norm() < 1e-6);
+            assert!((before.slope - after.slope).norm() < 1e-6);
         }
     }
 
@@ -354,7 +338,7 @@ mod tests {
     fn one_frame_stays_and_none_is_refused() {
         let root = path(1, |_| (Vector3::zeros(), Vector3::x()));
         assert_eq!(root.at(1.0), root.frame_motion(0));
-        assert_eq!(root.velocity(1.0), (Vector3::zeros(), Vector3::zeros()));
+        assert_eq!(root.frame_at(9.0), root.frames()[0]);
         assert!(RootSignal::through(RootKind::Ground, Vector3::zeros(), &[]).is_err());
     }
 }

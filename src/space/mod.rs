@@ -146,4 +146,9 @@ pub trait ShapeSpace: Send + Sync {
     /// # Panics
     /// `coordinates` is not d or `positions` not 3V long.
     fn decode(&self, coordinates: &[f64], positions: &mut [f64]);
+
+    /// Whether coordinates are the positions themselves, so that [`ShapeSpace::decode`] may be skipped.
+    fn is_identity(&self) -> bool {
+        false
+    }
 }

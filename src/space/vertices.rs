@@ -48,4 +48,8 @@ impl ShapeSpace for Vertices {
     fn decode(&self, coordinates: &[f64], positions: &mut [f64]) {
         positions.copy_from_slice(coordinates);
     }
+
+    fn is_identity(&self) -> bool {
+        true
+    }
 }
