@@ -3,7 +3,8 @@
 
 use divan::Bencher;
 use meshloom::image::Image;
-use meshloom::view::{Bounds, Camera, Renderer, Style, Surface};
+use meshloom::mesh::Bounds;
+use meshloom::view::{Camera, Renderer, Style, Surface};
 
 /// A wavy ball of `rings` times twice `rings` quads.
 fn ball(rings: u32) -> (Vec<[u32; 3]>, Vec<f32>) {
@@ -37,7 +38,7 @@ fn shade(bencher: Bencher<'_, '_>, rings: u32) {
         positions: &positions,
         colours: None,
     };
-    let camera = Camera::framing(&Bounds::of(&positions), 1.6);
+    let camera = Camera::framing(&Bounds::of(&positions).expect("points"), 1.6);
     let (mut renderer, mut image) = (Renderer::default(), Image::new(640, 400));
     bencher.bench_local(|| renderer.render(surface, &camera, &Style::DARK, &mut image));
 }

@@ -1,5 +1,7 @@
 //! An orbiting camera: where it looks, from which side, how much it shows.
 
+use crate::mesh::Bounds;
+
 /// Which axis of the mesh points up on the screen.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Up {
@@ -51,53 +53,6 @@ impl Default for Camera {
     }
 }
 
-/// A box along the axes, `min` <= `max`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bounds {
-    /// The corner with the smallest coordinates.
-    pub min: [f64; 3],
-    /// The corner with the largest.
-    pub max: [f64; 3],
-}
-
-impl Bounds {
-    /// The box of 3V coordinates, also of many frames in a row. Points that are not finite are left
-    /// out; of no points the unit box about the origin.
-    pub fn of(positions: &[f32]) -> Self {
-        let (mut min, mut max) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-        for point in positions.as_chunks::<3>().0 {
-            if point.iter().all(|value| value.is_finite()) {
-                min = std::array::from_fn(|i| min[i].min(point[i]));
-                max = std::array::from_fn(|i| max[i].max(point[i]));
-            }
-        }
-        if min[0] > max[0] {
-            (min, max) = ([-0.5; 3], [0.5; 3]);
-        }
-        Bounds {
-            min: min.map(f64::from),
-            max: max.map(f64::from),
-        }
-    }
-
-    /// The middle.
-    pub fn centre(&self) -> [f64; 3] {
-        std::array::from_fn(|i| 0.5 * (self.min[i] + self.max[i]))
-    }
-
-    pub(super) fn corners(&self) -> [[f64; 3]; 8] {
-        std::array::from_fn(|corner| {
-            std::array::from_fn(|i| {
-                if corner >> i & 1 == 0 {
-                    self.min[i]
-                } else {
-                    self.max[i]
-                }
-            })
-        })
-    }
-}
-
 impl Camera {
     /// The default direction, with all of `bounds` in a picture of that width / height.
     pub fn framing(bounds: &Bounds, aspect: f64) -> Self {
@@ -107,12 +62,18 @@ impl Camera {
     }
 
     /// Keeps the direction; moves the target and the extent so that all of `bounds` is seen with a
-    /// margin of a twentieth. `aspect` is width / height of the picture.
+    /// margin of a twentieth. `aspect` is width / height of the picture. A box that is not finite
+    /// leaves the camera as it is; a point is shown at extent 1.
     pub fn frame(&mut self, bounds: &Bounds, aspect: f64) {
-        self.target = bounds.centre();
+        let middle = |i: usize| 0.5 * (f64::from(bounds.min[i]) + f64::from(bounds.max[i]));
+        let target = [middle(0), middle(1), middle(2)];
+        if !target.iter().all(|value| value.is_finite()) {
+            return;
+        }
+        self.target = target;
         let [right, up, _] = self.axes();
         let (mut half_width, mut half_height) = (0.0_f64, 0.0_f64);
-        for corner in bounds.corners() {
+        for corner in corners(bounds) {
             let offset = std::array::from_fn(|i| corner[i] - self.target[i]);
             half_width = half_width.max(dot(right, offset).abs());
             half_height = half_height.max(dot(up, offset).abs());
@@ -197,8 +158,23 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
+/// The eight corners of a box.
+pub(super) fn corners(bounds: &Bounds) -> [[f64; 3]; 8] {
+    std::array::from_fn(|corner| {
+        std::array::from_fn(|i| {
+            let side = if corner >> i & 1 == 0 {
+                bounds.min
+            } else {
+                bounds.max
+            };
+            f64::from(side[i])
+        })
+    })
+}
+
 fn depth_of(bounds: &Bounds) -> f64 {
-    let sides: [f64; 3] = std::array::from_fn(|i| bounds.max[i] - bounds.min[i]);
+    let sides: [f64; 3] =
+        std::array::from_fn(|i| f64::from(bounds.max[i]) - f64::from(bounds.min[i]));
     dot(sides, sides).sqrt()
 }
 

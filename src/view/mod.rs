@@ -10,7 +10,7 @@ mod normals;
 mod raster;
 mod shade;
 
-pub use camera::{Bounds, Camera, Projection, Up};
+pub use camera::{Camera, Projection, Up};
 pub use heat::heat_colours;
 pub use shade::{Style, Wire};
 
