@@ -129,11 +129,11 @@ fn face_indices_that_name_no_vertex() {
 
 #[test]
 fn an_empty_file() {
-    refused(second_frame(""), CONVERT, &["frame_0002.obj", "empty"]);
+    refused(second_frame(""), CONVERT, &["frame_0002.obj", "0 bytes"]);
     refused(
         file("in.obj", ""),
         "convert in.obj -o out",
-        &["in.obj", "empty"],
+        &["in.obj", "0 bytes"],
     );
 }
 
@@ -321,4 +321,161 @@ fn sequences_that_cannot_be_compared() {
     };
     refused(prepare, "compare in shorter", &["shorter", "4 frames", "3"]);
     refused(prepare, "compare in finer", &["finer", "9 vertices", "16"]);
+}
+
+/// A base mesh and a cache of these bytes beside it.
+fn cache(name: &'static str, bytes: impl AsRef<[u8]>) -> impl FnOnce(&Path) {
+    move |folder| {
+        fs::write(folder.join("base.obj"), good().obj(0)).unwrap();
+        fs::write(folder.join(name), bytes).unwrap();
+    }
+}
+
+#[test]
+fn truncated_ply() {
+    let whole = good().ply(0);
+    for cut in [whole.len() - 4, whole.len() / 2, 30, 3] {
+        let line = "convert in.ply -o out";
+        refused(file("in.ply", &whole[..cut]), line, &["in.ply"]);
+    }
+}
+
+#[test]
+fn wrong_numbers_in_a_ply() {
+    let whole = good().ply(0);
+    let line = "convert in.ply -o out";
+    refused(
+        file("in.ply", whole.replacen("\n0 0 ", "\nnan 0 ", 1)),
+        line,
+        &["in.ply", "vertex 1"],
+    );
+    refused(
+        file("in.ply", whole.replacen("\n3 0 ", "\n3 9 ", 1)),
+        line,
+        &["in.ply", "face 1"],
+    );
+    refused(
+        file("in.ply", whole.replacen("\n3 0 ", "\n3 -1 ", 1)),
+        line,
+        &["in.ply", "face 1"],
+    );
+    refused(file("in.ply", ""), line, &["in.ply", "0 bytes"]);
+    refused(file("in.ply", good().obj(0)), line, &["in.ply"]);
+}
+
+#[test]
+fn a_ply_that_claims_more_than_it_holds() {
+    for (element, count) in [
+        ("vertex 9", "vertex 500000000"),
+        ("face 8", "face 4000000000"),
+    ] {
+        let text = good().ply(0).replacen(element, count, 1);
+        let line = "convert in.ply -o out";
+        refused(file("in.ply", &text), line, &["in.ply"]);
+        let binary = text.replacen("ascii", "binary_little_endian", 1);
+        refused(file("in.ply", &binary), line, &["in.ply"]);
+    }
+}
+
+#[test]
+fn caches_that_are_cut_short() {
+    for (name, whole) in [("in.pc2", good().pc2()), ("in.mdd", good().mdd())] {
+        for cut in [whole.len() - 1, whole.len() / 2, 20, 5, 0] {
+            let line = format!("convert {name} --mesh base.obj -o out");
+            refused(cache(name, &whole[..cut]), &line, &[name]);
+        }
+    }
+}
+
+#[test]
+fn caches_that_claim_more_than_they_hold() {
+    // 250 million vertices in 8 frames of 12 bytes: far more than the machine has.
+    let mut pc2 = good().pc2();
+    pc2[16..20].copy_from_slice(&250_000_000i32.to_le_bytes());
+    refused(
+        cache("in.pc2", &pc2),
+        "convert in.pc2 --mesh base.obj -o out",
+        &["in.pc2"],
+    );
+    let mut pc2 = good().pc2();
+    pc2[28..32].copy_from_slice(&i32::MAX.to_le_bytes());
+    refused(
+        cache("in.pc2", &pc2),
+        "convert in.pc2 --mesh base.obj -o out",
+        &["in.pc2"],
+    );
+    pc2[28..32].copy_from_slice(&(-1i32).to_le_bytes());
+    refused(
+        cache("in.pc2", &pc2),
+        "convert in.pc2 --mesh base.obj -o out",
+        &["in.pc2"],
+    );
+    let mut mdd = good().mdd();
+    mdd[..4].copy_from_slice(&u32::MAX.to_be_bytes());
+    refused(
+        cache("in.mdd", &mdd),
+        "convert in.mdd --mesh base.obj -o out",
+        &["in.mdd"],
+    );
+    let mut mdd = good().mdd();
+    mdd[4..8].copy_from_slice(&u32::MAX.to_be_bytes());
+    refused(
+        cache("in.mdd", &mdd),
+        "convert in.mdd --mesh base.obj -o out",
+        &["in.mdd"],
+    );
+}
+
+#[test]
+fn caches_that_do_not_fit_their_mesh() {
+    let other = sheet(4, 4);
+    for (name, bytes) in [("in.pc2", other.pc2()), ("in.mdd", other.mdd())] {
+        let line = format!("convert {name} --mesh base.obj -o out");
+        refused(cache(name, bytes), &line, &[name, "16", "9"]);
+    }
+}
+
+#[test]
+fn caches_with_numbers_that_are_not_finite() {
+    let (mut pc2, mut mdd) = (good().pc2(), good().mdd());
+    // Frame 2, vertex 3, y: after the header 9 vertices and 2.
+    pc2[32 + 4 * (27 + 7)..][..4].copy_from_slice(&f32::NAN.to_le_bytes());
+    mdd[8 + 4 * 4 + 4 * (27 + 7)..][..4].copy_from_slice(&f32::INFINITY.to_be_bytes());
+    for (name, bytes) in [("in.pc2", pc2), ("in.mdd", mdd)] {
+        let line = format!("convert {name} --mesh base.obj -o out");
+        refused(
+            cache(name, bytes),
+            &line,
+            &[name, "frame 2", "vertex 3", "finite"],
+        );
+    }
+}
+
+#[test]
+fn a_cache_without_its_mesh() {
+    for (name, bytes) in [("in.pc2", good().pc2()), ("in.mdd", good().mdd())] {
+        let prepare = |folder: &Path| fs::write(folder.join(name), bytes).unwrap();
+        refused(
+            prepare,
+            &format!("convert {name} -o out"),
+            &[name, "--mesh"],
+        );
+    }
+    let line = "convert in.pc2 --mesh gone.obj -o out";
+    refused(
+        cache("in.pc2", good().pc2()),
+        line,
+        &["gone.obj", "no such file"],
+    );
+    let line = "convert base.obj --mesh base.obj -o out";
+    refused(cache("in.pc2", good().pc2()), line, &["base.obj", "--mesh"]);
+}
+
+#[test]
+fn a_cache_by_name_that_is_something_else() {
+    for name in ["in.pc2", "in.mdd"] {
+        let line = format!("convert {name} --mesh base.obj -o out");
+        refused(cache(name, good().obj(0)), &line, &[name]);
+        refused(cache(name, ""), &line, &[name, "0 bytes"]);
+    }
 }

@@ -437,3 +437,23 @@ mod interruption {
         assert!(!staging(0), "nothing hidden is left");
     }
 }
+
+#[test]
+fn every_format_carries_the_same_frames() {
+    let folder = tempdir().unwrap();
+    sheet(4, 5).write_objs(&folder.path().join("sheet"));
+    for (out, mesh) in [
+        ("again.pc2", " --mesh sheet/frame_0001.obj"),
+        ("again.mdd", " --mesh sheet/frame_0001.obj"),
+        ("again/f_###.ply", ""),
+    ] {
+        let saved = format!("convert sheet -o {out} --fps 24 --json");
+        assert_eq!(meshloom(folder.path(), &saved).done().object()["frames"], 5);
+        let back = format!("convert {out}{mesh} -o back");
+        meshloom(folder.path(), &back).done();
+        let found = meshloom(folder.path(), "compare sheet back --json")
+            .done()
+            .object();
+        assert_eq!(found["max"], 0.0, "{out}");
+    }
+}

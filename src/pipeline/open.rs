@@ -247,6 +247,10 @@ fn in_file(mut error: Box<Diagnostic>, path: &Path, bytes: &[u8]) -> Box<Diagnos
                     .hint(format!("name it .{}", found.endings[0])),
             )
         }
+        _ if error.hints.is_empty() => Box::new(error.hint(DAMAGED)),
         _ => error,
     }
 }
+
+/// What is said where a format had no better hint.
+const DAMAGED: &str = "the file may be damaged: export it again";
