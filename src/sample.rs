@@ -3,9 +3,13 @@
 //! A loom of n frames lives on times [1, n]; frame i of the capture is at time i.
 
 use std::fmt;
+use std::io;
 use std::str::FromStr;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::diag::{Diagnostic, Result};
+use crate::loom::{Loom, Scratch};
+use crate::mesh::{FrameSource, Topology};
 
 /// How far, in steps, a time may lie from an end and still hit it.
 const HIT: f64 = 1e-9;
@@ -100,6 +104,61 @@ impl Times {
             }
             _ => Ok(()),
         }
+    }
+}
+
+/// A loom as the frames at chosen times. Nothing is computed before a frame is asked for, and frames may
+/// be asked for from several threads.
+pub struct Sampled {
+    loom: Loom,
+    sampling: Sampling,
+    /// Memory of the evaluations that are not going on just now.
+    idle: Mutex<Vec<Scratch>>,
+}
+
+impl Sampled {
+    /// `loom` at the times of `sampling`.
+    pub fn new(loom: Loom, sampling: Sampling) -> Self {
+        Sampled {
+            loom,
+            sampling,
+            idle: Mutex::default(),
+        }
+    }
+
+    /// The frames that the capture had: `loom` at 1, 2, .., n.
+    pub fn integers(loom: Loom) -> Self {
+        let times = (1..=loom.frames()).map(|i| i as f64).collect();
+        let fps = loom.fps();
+        Sampled::new(loom, Sampling { times, fps })
+    }
+
+    /// The time of every frame.
+    pub fn times(&self) -> &[f64] {
+        &self.sampling.times
+    }
+}
+
+impl FrameSource for Sampled {
+    fn topology(&self) -> &Arc<Topology> {
+        self.loom.topology()
+    }
+
+    fn frames(&self) -> usize {
+        self.sampling.times.len()
+    }
+
+    fn fps(&self) -> Option<f64> {
+        self.sampling.fps
+    }
+
+    fn read_frame(&self, frame: usize, positions: &mut [f32]) -> io::Result<()> {
+        let idle = || self.idle.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut scratch = idle().pop().unwrap_or_default();
+        let time = self.sampling.times[frame];
+        let evaluated = self.loom.evaluate(time, &mut scratch, positions);
+        idle().push(scratch);
+        evaluated.map_err(io::Error::other)
     }
 }
 
@@ -206,6 +265,21 @@ impl FromStr for Times {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::loom::test_looms::{ring, travelling};
+
+    #[test]
+    fn frames_are_the_loom_at_their_times() {
+        let loom = travelling(40, 12);
+        let sampling = Times::Rate(3.0).over(12, loom.fps()).unwrap();
+        let frames = Sampled::new(loom.clone(), sampling);
+        assert_eq!((frames.frames(), frames.fps()), (34, Some(72.0)));
+        let mut positions = vec![0.0; 120];
+        for (frame, &time) in frames.times().iter().enumerate() {
+            frames.read_frame(frame, &mut positions).unwrap();
+            assert_eq!(positions, loom.at(time).unwrap(), "at {time}");
+        }
+        assert_eq!(Sampled::integers(ring(5, 9, true)).times(), times("1:9", 9));
+    }
 
     fn times(text: &str, frames: usize) -> Vec<f64> {
         let times: Times = text.parse().unwrap();
