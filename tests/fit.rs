@@ -4,10 +4,15 @@ use std::fs;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use meshloom::loom::fit::{FitOptions, Fitted, fit_rows};
+use meshloom::loom::Loom;
+use meshloom::loom::fit::{self, FitOptions};
+use meshloom::loom::fitted::{Fitted, fit_rows};
 use meshloom::loom::frames::Frames;
 use meshloom::loom::pins::{Pin, PinPlace};
+use meshloom::loom::session::Session;
 use meshloom::mesh::{FrameSource, Sequence, Topology};
+use meshloom::signal::root::RootKind;
+use meshloom::space::SPACES;
 use meshloom::task::Task;
 
 /// n frames of `vertices` vertices; `point(vertex, time)` with time from 0 to 1.
@@ -397,6 +402,187 @@ fn the_number_of_threads_does_not_show() {
         (fitted.shape, fitted.signals, fitted.errors)
     };
     assert_eq!(run(1), run(2));
+}
+
+fn loom(sequence: &Sequence, options: &FitOptions) -> Loom {
+    fit::fit(sequence, options, &Task::default())
+        .unwrap()
+        .output
+}
+
+/// A tube of 8 x 12 vertices that bends, twists and travels `way` along x, turning about y by `turn`.
+fn tube(n: usize, way: f64, turn: f64) -> Sequence {
+    let (around, along) = (8, 12);
+    let moving = capture(n, around * along, |v, t| {
+        let angle = (v % around as f64) * std::f64::consts::TAU / around as f64;
+        let height = (v / around as f64).floor() / 3.0;
+        let bend = 0.5 * (7.0 * t).sin() * height;
+        let x = 0.3 * (angle + bend).cos() + bend * bend;
+        let z = 0.3 * (angle + bend).sin() + 0.2 * height * (5.0 * t).cos();
+        let (sin, cos) = (turn * t).sin_cos();
+        [cos * x + sin * z + way * t, height, cos * z - sin * x]
+    });
+    let corner = |i: usize, j: usize| (j * around + i % around) as u32;
+    let faces: Vec<[u32; 3]> = (0..along - 1)
+        .flat_map(|j| (0..around).map(move |i| (i, j)))
+        .flat_map(|(i, j)| {
+            let [a, b, c, d] = [
+                corner(i, j),
+                corner(i + 1, j),
+                corner(i, j + 1),
+                corner(i + 1, j + 1),
+            ];
+            [[a, c, b], [b, c, d]]
+        })
+        .collect();
+    let topology = Topology::from_triangles(around * along, &faces).unwrap();
+    Sequence::new(Arc::new(topology), moving.positions().to_vec(), Some(24.0))
+}
+
+/// Largest distance of a coordinate of psi(i) from frame i.
+fn worst(sequence: &Sequence, loom: &Loom) -> f32 {
+    let frame = |i: usize| {
+        let found = loom.at((i + 1) as f64).unwrap();
+        let pairs = found.into_iter().zip(sequence.frame(i));
+        pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+    };
+    (0..sequence.frames()).map(frame).fold(0.0, f32::max)
+}
+
+#[test]
+fn a_loom_plays_its_capture_in_every_space() {
+    let sequence = tube(12, 0.0, 0.0);
+    for kind in SPACES {
+        let options = FitOptions {
+            space: kind.name.to_string(),
+            ..given(14, 12, 11)
+        };
+        let loom = loom(&sequence, &options);
+        assert_eq!(loom.report().space, kind.name);
+        // single precision of coordinates of size 4; spaces decode to 1e-6 of the box
+        assert!(worst(&sequence, &loom) < 1e-5, "{}", kind.name);
+    }
+    let options = FitOptions {
+        space: "quaternions".to_string(),
+        ..given(14, 12, 11)
+    };
+    let error = fit::fit(&sequence, &options, &Task::default())
+        .err()
+        .expect("a refusal");
+    assert!(error.message.contains("no space `quaternions`"), "{error}");
+}
+
+#[test]
+fn root_motion_is_kept_apart_and_put_back() {
+    let sequence = tube(30, 9.0, 2.5);
+    let still = fit::fit(&sequence, &given(32, 30, 29), &Task::default()).unwrap();
+    assert!(
+        still.warnings.iter().any(|w| w.message.contains("travels")),
+        "{:?}",
+        still.warnings
+    );
+    let without = worst(&sequence, &loom(&sequence, &given(32, 30, 4)));
+    for kind in [RootKind::Ground, RootKind::Rigid] {
+        let options = FitOptions {
+            root: Some(kind),
+            ..given(32, 30, 29)
+        };
+        let rooted = fit::fit(&sequence, &options, &Task::default()).unwrap();
+        assert!(
+            !rooted
+                .warnings
+                .iter()
+                .any(|w| w.message.contains("travels"))
+        );
+        // frames are single precision, of size 10
+        assert!(worst(&sequence, &rooted.output) < 1e-5);
+        // the way and the turns take no modes any more
+        let few = loom(
+            &sequence,
+            &FitOptions {
+                root: Some(kind),
+                ..given(32, 30, 4)
+            },
+        );
+        assert!(worst(&sequence, &few) < 0.5 * without);
+    }
+}
+
+#[test]
+fn the_report_names_what_the_command_line_promises() {
+    let loom = loom(&tube(12, 0.0, 0.0), &given(10, 8, 5));
+    let json = serde_json::to_value(loom.report().as_ref()).unwrap();
+    for key in [
+        "frames",
+        "vertices",
+        "faces",
+        "space",
+        "dimension",
+        "controls",
+        "sites",
+        "modes",
+        "fps",
+        "error",
+        "left_out",
+        "stress",
+        "warnings",
+    ] {
+        assert!(json.get(key).is_some(), "{key} in {json}");
+    }
+    for (group, keys) in [
+        ("error", &["shape", "pose", "time", "total"][..]),
+        ("left_out", &["psi", "linear", "cubic"][..]),
+    ] {
+        assert!(
+            keys.iter().all(|key| json[group][key].is_number()),
+            "{group} in {json}"
+        );
+    }
+    assert_eq!(
+        (json["controls"].as_u64(), json["sites"].as_u64()),
+        (Some(10), Some(8))
+    );
+    assert_eq!(
+        (json["frames"].as_u64(), json["dimension"].as_u64()),
+        (Some(12), Some(288))
+    );
+}
+
+#[test]
+fn a_dragged_pin_settles_into_what_a_fit_under_it_gives() {
+    let sequence = tube(25, 0.0, 0.0);
+    let free = loom(&sequence, &given(20, 15, 6));
+    let task = Task::default();
+    let mut session = Session::of(&free).unwrap();
+    let place = |frame: usize, by: f64| free.layout().positions[frame].map(|x| x + by);
+    session.drag(4, place(4, 0.0), &task).unwrap();
+    for step in 1..=5 {
+        let to = place(18, 0.02 * f64::from(step));
+        let signals = session.drag(18, to, &task).unwrap();
+        assert_eq!(signals.layout.positions[18], to);
+        assert_eq!(signals.layout.positions[4], place(4, 0.0));
+        assert_eq!(signals.pose.site_frames(), free.pose().site_frames());
+        assert_eq!(signals.time.controls().len(), 20);
+    }
+    let settled = session.settle(&task).unwrap();
+    let settled = session.loom(&free, settled).unwrap();
+    let pin = |frame: usize, by: f64| Pin {
+        frame: frame + 1,
+        at: PinPlace::Layout(place(frame, by)),
+    };
+    let pins = vec![pin(4, 0.0), pin(18, 0.1)];
+    let cold = loom(
+        &sequence,
+        &FitOptions {
+            pins,
+            ..given(20, 15, 6)
+        },
+    );
+    assert_eq!(settled.layout(), cold.layout());
+    assert_eq!(settled.at(7.3).unwrap(), cold.at(7.3).unwrap());
+    assert!((settled.report().error.total - cold.report().error.total).abs() < 1e-12);
+    assert!(session.drag(25, [0.0, 0.0], &task).is_err());
+    assert!(session.drag(3, [f64::NAN, 0.0], &task).is_err());
 }
 
 /// Every `step`-th frame of a shared capture, where there is one.

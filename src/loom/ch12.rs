@@ -104,21 +104,28 @@ pub fn time(positions: &[Point], controls: usize, alpha: f64) -> Result<TimeSign
     })
 }
 
-/// All of it with given k and l, clamped to what the positions allow.
+/// f with as many of `controls` control points as the positions allow.
+///
+/// # Errors
+/// A position is not finite.
+pub fn time_within(positions: &[Point], controls: usize, alpha: f64) -> Result<TimeSignal> {
+    let (least, most) = control_bounds(positions);
+    time(positions, controls.clamp(least, most), alpha)
+}
+
+/// All of it with given k and l, clamped to what the positions allow, the `pins` held (frames from 0).
 ///
 /// # Errors
 /// The task was cancelled; numbers too large to be squared.
 pub fn signals(
     subspace: &Subspace,
-    controls: usize,
-    sites: usize,
-    alpha: f64,
+    (controls, sites): (usize, usize),
+    (alpha, pins): (f64, &[(usize, Point)]),
     task: &Task,
 ) -> Result<Signals> {
-    let layout = place(subspace, &[], task)?;
-    let (least, most) = control_bounds(&layout.positions);
+    let layout = place(subspace, pins, task)?;
     let pose = pose(subspace, &layout.positions, sites.max(3))?;
-    let time = time(&layout.positions, controls.clamp(least, most), alpha)?;
+    let time = time_within(&layout.positions, controls, alpha)?;
     Ok(Signals {
         layout,
         distinct: pose.distinct,
@@ -158,7 +165,7 @@ pub fn each<T: Sync, U: Send>(
 }
 
 /// Numbers that no fit is possible for, whatever the reason given below.
-fn unfit(error: impl std::fmt::Debug) -> Box<Diagnostic> {
+pub(super) fn unfit(error: impl std::fmt::Debug) -> Box<Diagnostic> {
     Box::new(
         Diagnostic::error(format!("the signals cannot be fitted: {error:?}"))
             .hint("coordinates above 1e150 overflow when they are squared"),

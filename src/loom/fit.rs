@@ -1,17 +1,23 @@
-//! Fitting psi = h o g o f to a capture (CH12 §3): the shape signal from all frames, then layout, pose and
-//! time signal in its subspace, then what the fit is worth.
+//! Fitting psi = h o g o f to a capture (CH12 §3): root motion split off, frames encoded in a shape space,
+//! signals fitted to them ([`super::fitted`]), and a loom made of it all.
 
-use super::ch12::{self, Signals};
-use super::fidelity::{self, Chosen, Fidelity};
-use super::left_out::{self, LeftOutFit};
+use std::sync::Arc;
+
+use super::fidelity::Fidelity;
+use super::fitted::{Fitted, fit_rows};
+use super::frames::{Frames, travel_warning};
 use super::pins::{self, Pin};
-use super::report::Errors;
-use super::subspace::{Subspace, explained};
-use super::warnings;
-use crate::diag::{Diagnostic, Result};
-use crate::math::pca::{Basis, Pca, Rows};
-use crate::signal::shape::ShapeSignal;
+use super::report::FitReport;
+use super::{Layout, Loom, Parts, warnings};
+use crate::diag::{Diagnostic, Result, Warned};
+use crate::math::pca::{Rows, Table};
+use crate::mesh::{FrameSource, Sequence};
+use crate::signal::root::RootKind;
+use crate::space::{ShapeSpace, SpaceError, Spaces, encode_frames};
 use crate::task::Task;
+
+/// So many frames at most show a space that adapts to them what it will have to hold.
+const SAMPLES: usize = 16;
 
 /// How psi is found between frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -33,6 +39,8 @@ impl Method {
 /// What to fit. The default leaves everything to the tolerance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FitOptions {
+    /// The shape space's name, one of [`crate::space::SPACES`]; default "vertices".
+    pub space: String,
     /// How psi is found between frames.
     pub method: Method,
     /// k, control points of the time signal, 4 to n+2; none: as few as the tolerance allows.
@@ -47,6 +55,8 @@ pub struct FitOptions {
     pub pins: Vec<Pin>,
     /// Exponent of the time signal's parametrisation, 0 (uniform) to 1 (by length); default 1/2.
     pub alpha: f64,
+    /// Root motion to split off and keep as a signal of its own; none: it stays in the shapes.
+    pub root: Option<RootKind>,
     /// Frames per second, where the capture does not say or says wrong.
     pub fps: Option<f64>,
     /// Whether to measure the error between frames too.
@@ -56,6 +66,7 @@ pub struct FitOptions {
 impl Default for FitOptions {
     fn default() -> Self {
         FitOptions {
+            space: "vertices".to_string(),
             method: Method::default(),
             controls: None,
             sites: None,
@@ -63,6 +74,7 @@ impl Default for FitOptions {
             tolerance: 0.01,
             pins: Vec::new(),
             alpha: 0.5,
+            root: None,
             fps: None,
             left_out: true,
         }
@@ -70,7 +82,7 @@ impl Default for FitOptions {
 }
 
 impl FitOptions {
-    fn fidelity(&self) -> Fidelity {
+    pub(super) fn fidelity(&self) -> Fidelity {
         Fidelity {
             controls: self.controls,
             sites: self.sites,
@@ -80,7 +92,7 @@ impl FitOptions {
     }
 
     /// Whatever can be refused before the frames are looked at.
-    fn check(&self, frames: usize) -> Result<()> {
+    pub(super) fn check(&self, frames: usize) -> Result<()> {
         if frames == 0 {
             return Diagnostic::error("there are no frames to fit").err();
         }
@@ -97,100 +109,131 @@ impl FitOptions {
     }
 }
 
-/// The three signals of some rows, and what is known about them.
-pub struct Fitted {
-    /// h.
-    pub shape: ShapeSignal,
-    /// The rows in h's subspace.
-    pub subspace: Subspace,
-    /// g and f.
-    pub signals: Signals,
-    /// Errors at the rows.
-    pub errors: Errors,
-    /// Errors between them.
-    pub left_out: Option<LeftOutFit>,
-    /// Modes that are not rounding.
-    pub rank: usize,
-    /// What should be known.
-    pub warnings: Vec<Diagnostic>,
-}
-
-/// Fits rows: frames in any Euclidean space.
+/// Fits psi to a capture. Phases of `task`: "encode", "shape", "layout", "pose", "time", "left_out"
+/// ("shape" to "time" come twice where a tolerance cannot be kept).
+///
+/// One frame gives one pose for all time, two the segment between them.
 ///
 /// # Errors
-/// Options out of bounds, naming the bound; rows that are not finite; the task was cancelled.
-pub fn fit_rows(rows: &dyn Rows, options: &FitOptions, task: &Task) -> Result<Fitted> {
-    options.check(rows.rows())?;
-    task.phase("shape", 0);
-    let pca = Pca::new(rows, task).map_err(explained)?;
-    let (basis, chosen) = choose(rows, &pca, options, task)?;
-    let Chosen {
-        subspace,
-        signals,
-        met,
-    } = chosen;
-    let errors = Errors::measure(&subspace, &signals);
-    let left_out = if options.left_out {
-        left_out(&pca, &signals, options, task)?
-    } else {
-        None
+/// No frames; options out of bounds, naming the bound; a pin on no frame; a space that does not suit the
+/// mesh; coordinates too large to be squared; the task was cancelled.
+pub fn fit(sequence: &Sequence, options: &FitOptions, task: &Task) -> Result<Warned<Loom>> {
+    options.check(sequence.frames())?;
+    task.phase("encode", sequence.frames());
+    let (frames, root) = match options.root {
+        None => (Frames::new(sequence), None),
+        Some(kind) => {
+            let (frames, root) = Frames::without_root(sequence, kind, task)?;
+            (frames, Some(Arc::new(root)))
+        }
     };
-    let fidelity = options.fidelity();
-    let mut warnings = warnings::of_fidelity(&fidelity, &basis, &signals, &errors, met);
-    warnings.extend(left_out.as_ref().and_then(warnings::between_frames));
-    let mut vectors = basis.vectors;
-    vectors.truncate(subspace.modes * rows.columns());
-    vectors.shrink_to_fit();
-    let shape = ShapeSignal::new(pca.mean().to_vec(), vectors, subspace.modes)
-        .map_err(|error| Box::new(Diagnostic::error(error.to_string())))?;
-    Ok(Fitted {
-        shape,
-        subspace,
-        signals,
-        errors,
-        left_out,
-        rank: basis.rank,
+    let space = open_space(sequence, &frames, &options.space)?;
+    let mut warnings = Vec::new();
+    if root.is_none() {
+        warnings.extend(travel_warning(sequence));
+    }
+    let fps = options.fps.or(sequence.fps());
+    warnings.extend(warnings::of_length(sequence.frames(), fps));
+    let fitted = if space.is_identity() {
+        fit_rows(&frames, options, task)?
+    } else {
+        let (rows, turns) = encode(&frames, &*space, task)?;
+        warnings.extend(warnings::of_turns(turns));
+        fit_rows(&Table::new(&rows, space.dimension()), options, task)?
+    };
+    warnings.extend(fitted.warnings.iter().cloned());
+    let report = report(sequence, options, &*space, &fitted, &warnings);
+    let loom = Loom::new(Parts {
+        topology: Arc::clone(sequence.topology()),
+        fps,
+        space,
+        layout: Arc::new(layout(&fitted, &options.pins)),
+        shape: Arc::new(fitted.shape),
+        pose: Arc::new(fitted.signals.pose),
+        time: Arc::new(fitted.signals.time),
+        root,
+        report: Arc::new(report),
+    })?;
+    Ok(Warned {
+        output: loom,
         warnings,
     })
 }
 
-/// The signals that keep the tolerance with the fewest numbers; full fidelity where none do.
-fn choose(
-    rows: &dyn Rows,
-    pca: &Pca,
-    options: &FitOptions,
-    task: &Task,
-) -> Result<(Basis, Chosen)> {
-    let fidelity = options.fidelity();
-    let (least, most) = fidelity.modes_to_try(pca);
-    let mut basis = pca.basis(rows, most, task).map_err(explained)?;
-    let subspace = Subspace::new(pca, &basis);
-    let setting = (options.alpha, &options.pins[..]);
-    let found = fidelity::choose(&fidelity, &subspace, least, setting, task)?;
-    if let Some(chosen) = found {
-        return Ok((basis, chosen));
-    }
-    let all = fidelity.modes.unwrap_or(pca.rows() - 1);
-    if basis.modes < all {
-        basis.vectors = Vec::new();
-        task.phase("shape", 0);
-        basis = pca.basis(rows, all, task).map_err(explained)?;
-    }
-    let chosen = fidelity::full(&fidelity, Subspace::new(pca, &basis), setting, task)?;
-    Ok((basis, chosen))
+/// The space called `name` about the first frame, without its root motion.
+fn open_space(sequence: &Sequence, frames: &Frames<'_>, name: &str) -> Result<Arc<dyn ShapeSpace>> {
+    let n = sequence.frames();
+    let read = |frame: usize| {
+        let mut positions = vec![0.0; frames.columns()];
+        frames.copy(frame, 0..frames.columns(), &mut positions);
+        positions
+    };
+    let count = if name == "vertices" {
+        0
+    } else {
+        n.min(SAMPLES)
+    };
+    let samples: Vec<Vec<f64>> = (0..count)
+        .map(|sample| read(sample * (n - 1) / (count - 1).max(1)))
+        .collect();
+    let samples: Vec<&[f64]> = samples.iter().map(Vec::as_slice).collect();
+    Spaces::new(Arc::clone(sequence.topology()), &read(0))
+        .open(name, &samples)
+        .map_err(|error| unsuitable(&error))
 }
 
-/// The error between frames, without pins: those belong to the frames, half of which are gone.
-fn left_out(
-    pca: &Pca,
-    signals: &Signals,
-    options: &FitOptions,
-    task: &Task,
-) -> Result<Option<LeftOutFit>> {
-    task.phase("left_out", 0);
-    let (controls, sites) = (signals.time.controls().len(), signals.pose.sites().len());
-    let method = |subspace: &Subspace, controls: usize, sites: usize| {
-        ch12::signals(subspace, controls, sites, options.alpha, task)
+fn unsuitable(error: &SpaceError) -> Box<Diagnostic> {
+    let diagnostic = Diagnostic::error(error.to_string());
+    Box::new(match error {
+        SpaceError::Singular { vertex } => diagnostic.at_vertex(vertex + 1),
+        SpaceError::TooLarge | SpaceError::Unsuitable { .. } => diagnostic,
+    })
+}
+
+/// All frames in a space, row after row, and how many rotations turned too far in one step.
+fn encode(frames: &Frames<'_>, space: &dyn ShapeSpace, task: &Task) -> Result<(Vec<f64>, usize)> {
+    let mut rows = vec![0.0; frames.rows() * space.dimension()];
+    let vertices = frames.columns() / 3;
+    let read = |frame: usize, positions: &mut [f64]| -> Result<()> {
+        frames.copy(frame, 0..positions.len(), positions);
+        Ok(())
     };
-    left_out::measure(pca, (controls, sites, signals.pose.modes()), &method, task)
+    let turns = encode_frames(space, vertices, read, &mut rows, task)?;
+    Ok((rows, turns))
+}
+
+/// What the signals were fitted to, the pins where they came to lie.
+fn layout(fitted: &Fitted, pins: &[Pin]) -> Layout {
+    let positions = &fitted.signals.layout.positions;
+    let held = |pin: &Pin| (pin.frame - 1, positions[pin.frame - 1]);
+    Layout {
+        positions: positions.clone(),
+        coordinates: fitted.subspace.x.clone(),
+        pins: pins.iter().map(held).collect(),
+    }
+}
+
+fn report(
+    sequence: &Sequence,
+    options: &FitOptions,
+    space: &dyn ShapeSpace,
+    fitted: &Fitted,
+    warnings: &[Diagnostic],
+) -> FitReport {
+    FitReport {
+        vertices: sequence.topology().vertices(),
+        faces: sequence.topology().faces(),
+        space: space.name().to_string(),
+        dimension: space.dimension(),
+        fps: options.fps.or(sequence.fps()),
+        left_out: fitted.left_out.as_ref().map(Into::into),
+        warnings: warnings
+            .iter()
+            .map(|warning| warning.message.clone())
+            .collect(),
+        method: options.method.name().to_string(),
+        alpha: options.alpha,
+        rank: fitted.rank,
+        ..FitReport::of_signals(&fitted.subspace, &fitted.signals, options.pins.len())
+    }
 }

@@ -4,10 +4,12 @@ pub mod ch12;
 pub mod fidelity;
 pub mod file;
 pub mod fit;
+pub mod fitted;
 pub mod frames;
 pub mod left_out;
 pub mod pins;
 pub mod report;
+pub mod session;
 pub mod subspace;
 pub mod warnings;
 

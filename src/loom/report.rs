@@ -40,6 +40,8 @@ pub struct FitReport {
     pub warnings: Vec<String>,
     /// How it was fitted: "ch12" or "ordered".
     pub method: String,
+    /// Exponent of the time signal's parametrisation.
+    pub alpha: f64,
     /// Positions that differ from the one before: the n of k/n and l/n.
     pub distinct: usize,
     /// k/n, l/n, m/n: how complicated, how little repetitive, how rich in shapes the motion is (CH12 §3.4).
@@ -110,6 +112,42 @@ pub struct Merged {
     pub frames: usize,
     /// Largest error that this makes, relative like the errors: what exactness can reach.
     pub error: f64,
+}
+
+impl FitReport {
+    /// What signals say about themselves, with so many frames pinned; whatever needs more is left open.
+    pub fn of_signals(subspace: &Subspace, signals: &Signals, pinned: usize) -> Self {
+        let n = subspace.frames;
+        let distinct = ch12::distinct(&signals.layout.positions);
+        let moves = distinct > 1;
+        let count = |count: usize| if moves { count } else { 0 };
+        let (controls, sites) = (signals.time.controls().len(), signals.pose.sites().len());
+        let share = |count: usize| count as f64 / distinct as f64;
+        FitReport {
+            frames: n,
+            controls: count(controls),
+            sites: count(sites),
+            modes: subspace.modes,
+            error: Errors::measure(subspace, signals),
+            stress: signals.layout.relative_stress,
+            distinct,
+            share: Share {
+                controls: share(count(controls)),
+                sites: share(count(sites)),
+                modes: subspace.modes as f64 / n as f64,
+            },
+            layout: LayoutReport {
+                steps: signals.layout.steps,
+                converged: signals.layout.converged,
+                pinned,
+            },
+            merged: Merged {
+                frames: n - signals.distinct.min(n),
+                error: subspace.relative(signals.merged),
+            },
+            ..FitReport::default()
+        }
+    }
 }
 
 impl Errors {

@@ -106,3 +106,14 @@ pub fn of_length(frames: usize, fps: Option<f64>) -> Option<Diagnostic> {
         .hint("`--range A:B` fits a part")
     })
 }
+
+/// Rotations in doubt.
+pub fn of_turns(turns: usize) -> Option<Diagnostic> {
+    (turns > 0).then(|| {
+        Diagnostic::warning(format!(
+            "{turns} rotations turn by more than 150 degrees from one frame to the next: which way round \
+             is a guess"
+        ))
+        .hint("more frames, or another space, leave no doubt")
+    })
+}

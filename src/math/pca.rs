@@ -33,6 +33,9 @@ pub const RANK_CUT: f64 = 1e-13;
 /// largest, so these by less than a thousandth.
 const RESOLVED: f64 = 1e-6;
 
+/// Columns whose cosines are below this are orthonormal to rounding after one round.
+const NEARLY: f64 = 1e-2;
+
 /// A panel holds about this many numbers: 2 MB stay in the second-level cache.
 const PANEL: usize = 1 << 18;
 
@@ -246,8 +249,11 @@ impl Pca {
         let mut vectors = vec![0.0; d * m];
         let mut h = MatMut::from_column_major_slice_mut(&mut vectors, d, m);
         self.project(rows, chosen.as_ref(), h.as_mut(), task)?;
+        // a second round where the first had more to do than rounding leaves
         for _ in 0..2 {
-            orthonormalise(h.as_mut(), task)?;
+            if orthonormalise(h.as_mut(), task)? < NEARLY {
+                break;
+            }
         }
         let mut x = self.coordinates(rows, h.as_ref(), task)?;
         fix_signs(h.as_mut(), x.as_mut());
@@ -498,17 +504,21 @@ fn add_gram(panel: MatRef<'_, f64>, sum: MatMut<'_, f64>) {
     );
 }
 
-/// One round of W = H R: H replaces W.
-fn orthonormalise(mut h: MatMut<'_, f64>, task: &Task) -> Result<(), PcaError> {
+/// One round of W = H R: H replaces W. Gives the largest cosine between two columns of W.
+fn orthonormalise(mut h: MatMut<'_, f64>, task: &Task) -> Result<f64, PcaError> {
     let (d, m) = (h.nrows(), h.ncols());
     let panels = Panels::of(m, d, 0);
     let gram = panels.sum(task, m, m, |columns, sum, _| {
         add_gram(h.as_ref().get(columns, ..), sum);
     })?;
+    let cosine = |i: usize, j: usize| gram[(i, j)].abs() / (gram[(i, i)] * gram[(j, j)]).sqrt();
+    let pairs = (0..m).flat_map(|i| (0..i).map(move |j| (i, j)));
+    let largest = pairs.map(|(i, j)| cosine(i, j)).fold(0.0, f64::max);
     let lower = symmetric::cholesky(gram);
     panels.each(h.as_mut(), task, |_, part, _| {
         solve_lower_triangular_in_place(lower.as_ref(), part.transpose_mut(), Par::Seq);
-    })
+    })?;
+    Ok(largest)
 }
 
 /// The largest entry of each column of X becomes positive.
