@@ -11,6 +11,7 @@ pub mod order_graph;
 pub mod ordered;
 pub mod pca;
 pub mod rotation;
+pub mod rotation_graph;
 pub mod sparse;
 pub mod symmetric;
 pub mod thin_plate;

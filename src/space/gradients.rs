@@ -17,7 +17,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
-use super::placement::{Placement, follow_rotation, triple};
+use super::placement::{Placement, blocks_from, follow_rotation, triple};
 use super::registry::State;
 use super::scales::{Scales, area_shares};
 use super::{Block, Invariance, ShapeSpace};
@@ -85,18 +85,11 @@ impl ShapeSpace for Gradients {
 
     fn blocks(&self) -> Vec<Block> {
         let faces = self.faces();
-        let mut blocks = vec![
-            Block {
-                name: "rotation",
-                range: 0..3 * faces,
-                weight: self.rotation,
-            },
-            Block {
-                name: "scale/shear",
-                range: 3 * faces..9 * faces,
-                weight: self.stretch,
-            },
+        let bare = [
+            ("rotation", 3 * faces, self.rotation),
+            ("scale/shear", 6 * faces, self.stretch),
         ];
+        let mut blocks = blocks_from(0, &bare);
         blocks.extend(self.placement.blocks(9 * faces));
         blocks
     }

@@ -12,6 +12,7 @@
 //!   over all vertices of their squared displacements: see [`Block`].
 
 mod gradients;
+mod patch_lri;
 mod placement;
 mod registry;
 mod scales;
@@ -22,6 +23,7 @@ use std::fmt;
 use std::ops::Range;
 
 pub use gradients::Gradients;
+pub use patch_lri::PatchLri;
 pub use registry::{SPACES, SpaceKind, Spaces, State};
 pub use sequence::{LARGE_TURN, encode_frames};
 pub use vertices::Vertices;

@@ -58,20 +58,7 @@ impl Placement {
                 1.0,
             ),
         ];
-        let mut at = start;
-        let mut blocks = Vec::new();
-        for (name, length, weight) in lengths {
-            if length > 0 {
-                let range = at..at + length;
-                at = range.end;
-                blocks.push(Block {
-                    name,
-                    range,
-                    weight,
-                });
-            }
-        }
-        blocks
+        blocks_from(start, &lengths)
     }
 
     /// Coordinates of a shape whose mean rotation is `mean` and whose groups have the rotations
@@ -119,6 +106,14 @@ impl Placement {
         exp(&(triple(coordinates, 0) / self.rotation))
     }
 
+    /// The rotations of the groups relative to R; the identity for a single group.
+    pub(super) fn group_rotation(&self, coordinates: &[f64], group: usize) -> UnitQuaternion<f64> {
+        match self.groups.get(group) {
+            Some(weight) => exp(&(triple(coordinates, 1 + group) / *weight)),
+            None => UnitQuaternion::identity(),
+        }
+    }
+
     /// Puts a shape where the coordinates say: `positions` has each part where it happens to be, turned
     /// back by R.
     pub(super) fn decode(&self, coordinates: &[f64], positions: &mut [f64]) {
@@ -161,6 +156,24 @@ impl Placement {
             .sum();
         sum / self.components.part().len().max(1) as f64
     }
+}
+
+/// Blocks given by name, length and weight, one after the other from coordinate `start`; empty ones are
+/// left out.
+pub(super) fn blocks_from(start: usize, lengths: &[(&'static str, usize, f64)]) -> Vec<Block> {
+    let mut end = start;
+    lengths
+        .iter()
+        .map(|&(name, length, weight)| {
+            end += length;
+            Block {
+                name,
+                range: end - length..end,
+                weight,
+            }
+        })
+        .filter(|block| !block.range.is_empty())
+        .collect()
 }
 
 /// Moves one weighted rotation vector to the branch nearest `near`; tells whether it turns far.

@@ -2,8 +2,8 @@
 
 use std::sync::{Arc, OnceLock};
 
-use super::{Block, Gradients, ShapeSpace, SpaceError, Vertices};
-use crate::mesh::{Poisson, PoissonAnalysis, Topology};
+use super::{Block, Gradients, PatchLri, ShapeSpace, SpaceError, Vertices};
+use crate::mesh::{Hinges, Poisson, PoissonAnalysis, Topology};
 
 /// A kind of shape space.
 pub struct SpaceKind {
@@ -35,7 +35,24 @@ pub const SPACES: &[SpaceKind] = &[
             )))
         },
     },
+    SpaceKind {
+        name: "patch-lri",
+        summary: "rotations relative to patches, patches to each other: for the largest motions",
+        build: patch_lri,
+    },
 ];
+
+fn patch_lri(
+    spaces: &Spaces,
+    poses: &[&[f64]],
+    state: Option<&State>,
+) -> Result<Arc<dyn ShapeSpace>, SpaceError> {
+    let (poisson, reference, hinges) = (spaces.poisson()?, spaces.reference(), spaces.hinges()?);
+    Ok(Arc::new(match state {
+        None => PatchLri::grown(poisson, reference, &hinges, poses)?,
+        Some(state) => PatchLri::new(poisson, reference, &hinges, state.patches.clone())?,
+    }))
+}
 
 /// What a space is made of besides connectivity, for storing it.
 #[derive(Debug, Clone, PartialEq)]
@@ -72,6 +89,7 @@ pub struct Spaces {
     topology: Arc<Topology>,
     reference: Arc<[f64]>,
     analysis: Arc<OnceLock<Result<Arc<PoissonAnalysis>, SpaceError>>>,
+    hinges: Arc<OnceLock<Arc<Hinges>>>,
     poisson: OnceLock<Result<Arc<Poisson>, SpaceError>>,
 }
 
@@ -90,6 +108,7 @@ impl Spaces {
             topology,
             reference: reference.into(),
             analysis: Arc::default(),
+            hinges: Arc::default(),
             poisson: OnceLock::new(),
         }
     }
@@ -102,6 +121,7 @@ impl Spaces {
     pub fn about(&self, reference: &[f64]) -> Self {
         let mut other = Spaces::new(Arc::clone(&self.topology), reference);
         other.analysis = Arc::clone(&self.analysis);
+        other.hinges = Arc::clone(&self.hinges);
         other
     }
 
@@ -162,19 +182,29 @@ impl Spaces {
         self.topology.vertices()
     }
 
+    /// The connectivity, analysed.
+    fn analysis(&self) -> Result<Arc<PoissonAnalysis>, SpaceError> {
+        let analyse = || {
+            let triangles = self.topology.triangles();
+            Ok(PoissonAnalysis::new(self.vertices(), triangles)?)
+        };
+        self.analysis.get_or_init(analyse).clone()
+    }
+
     /// The factored system that finds positions from gradients.
     fn poisson(&self) -> Result<Arc<Poisson>, SpaceError> {
-        self.poisson
-            .get_or_init(|| {
-                let analysis = self.analysis.get_or_init(|| {
-                    Ok(PoissonAnalysis::new(
-                        self.vertices(),
-                        self.topology.triangles(),
-                    )?)
-                });
-                Ok(Arc::new(Poisson::new(analysis.clone()?, &self.reference)?))
-            })
-            .clone()
+        let factor = || Ok(Arc::new(Poisson::new(self.analysis()?, &self.reference)?));
+        self.poisson.get_or_init(factor).clone()
+    }
+
+    /// The edges and the pairs of triangles at them.
+    fn hinges(&self) -> Result<Arc<Hinges>, SpaceError> {
+        let analysis = self.analysis()?;
+        let collect = || {
+            let triangles = self.topology.triangles();
+            Arc::new(Hinges::new(self.vertices(), triangles, analysis.corners()))
+        };
+        Ok(Arc::clone(self.hinges.get_or_init(collect)))
     }
 }
 

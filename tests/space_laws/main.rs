@@ -271,6 +271,29 @@ fn a_space_is_made_again_from_its_state() {
     }
 }
 
+fn check_patches(case: &Case) {
+    let spaces = Spaces::new(Arc::clone(&case.topology), &case.poses[0]);
+    let poses: Vec<&[f64]> = case.poses.iter().map(Vec::as_slice).collect();
+    let patches = spaces.open("patch-lri", &poses).unwrap().state().patches;
+    let count = *patches.iter().max().unwrap() as usize + 1;
+    let mut sizes = vec![0; count];
+    patches.iter().for_each(|&patch| sizes[patch as usize] += 1);
+    assert!((8..=200).contains(&count), "{}: {count} patches", case.name);
+    assert!(
+        sizes.iter().all(|&size| size >= 10),
+        "{}: {sizes:?}",
+        case.name
+    );
+}
+
+#[test]
+fn there_are_8_to_200_patches_of_ten_triangles_or_more() {
+    check_patches(&bar_pair(1.0));
+    for folder in captures::folders() {
+        check_patches(&captures::read(&folder, 2));
+    }
+}
+
 #[test]
 fn differences_count_like_displacements_in_every_space() {
     // a shift, a small turn and a small growth move every vertex: the norm of the difference of
