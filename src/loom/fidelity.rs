@@ -84,7 +84,9 @@ impl Fidelity {
             Some(modes) => (modes, modes),
             None => {
                 let least = least.unwrap_or(most);
-                (least, (least + MORE_MODES).min(most))
+                // modes beyond those resolved leave out less than 1e-6 already
+                let useful = pca.resolved().clamp(least, most);
+                (least, (least + MORE_MODES).min(useful))
             }
         }
     }
@@ -150,8 +152,7 @@ pub fn choose(
         .collect();
     task.phase("time", 0);
     let times = ch12::each(&candidates, |candidate| {
-        task.check()?;
-        fidelity.time(candidate, alpha)
+        fidelity.time(candidate, alpha, task)
     })?;
     let numbers = |(candidate, time): &(Candidate, TimeSignal)| {
         2 * time.controls().len() + candidate.pose.signal.sites().len() * candidate.subspace.modes
@@ -222,7 +223,7 @@ impl Fidelity {
     }
 
     /// f with the control points asked for, or the fewest within the tolerance; None where no number is.
-    fn time(&self, candidate: &Candidate, alpha: f64) -> Result<Option<TimeSignal>> {
+    fn time(&self, candidate: &Candidate, alpha: f64, task: &Task) -> Result<Option<TimeSignal>> {
         let positions = &candidate.layout.positions;
         let n = ch12::distinct(positions);
         if n == 1 {
@@ -234,6 +235,7 @@ impl Fidelity {
             return Ok(fits.then_some(time));
         }
         for controls in 4..=n + 2 {
+            task.check()?;
             let time = ch12::time(positions, controls, alpha)?;
             if self.keeps(candidate, &time) {
                 return Ok(Some(time));

@@ -110,7 +110,7 @@ pub fn travel_warning(sequence: &Sequence) -> Option<Diagnostic> {
             .fold(0.0, f64::max)
             .sqrt();
     let way = (rigid_align::mean(&last) - middle).norm();
-    (way > TRAVELS * size).then(|| {
+    (size > 0.0 && way > TRAVELS * size).then(|| {
         Diagnostic::warning(format!(
             "the capture travels {:.1} times its size: loops will jump back",
             way / size
