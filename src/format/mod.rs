@@ -5,6 +5,7 @@
 
 pub mod cache;
 mod face_check;
+pub mod loom;
 pub mod mdd;
 pub mod obj;
 pub mod pc2;
