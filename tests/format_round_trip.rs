@@ -41,15 +41,17 @@ fn write(world: &dyn World, source: &dyn FrameSource, path: &str) -> Vec<String>
 fn every_format_gives_back_what_it_was_given() {
     let given = capture(3).with_fps(Some(25.0));
     for format in FORMATS {
+        if matches!(format.kind, Kind::Scene(_)) {
+            continue; // read only: tests/gltf.rs
+        }
         for ending in format.endings {
             let world = MemoryWorld::new();
             let out = match format.kind {
                 Kind::Mesh(_) => format!("out/f####.{ending}"),
-                Kind::Cache(_) => format!("out/f.{ending}"),
+                _ => format!("out/f.{ending}"),
             };
             write(&world, &given, &out);
             let spec = match format.kind {
-                Kind::Mesh(_) => InputSpec::new(&out),
                 Kind::Cache(_) => {
                     write(&world, &given.slice(1..2), "base.ply");
                     InputSpec {
@@ -57,6 +59,7 @@ fn every_format_gives_back_what_it_was_given() {
                         ..InputSpec::new(&out)
                     }
                 }
+                _ => InputSpec::new(&out),
             };
             let back = read(&world, &spec);
             let name = format.name;

@@ -10,6 +10,7 @@
 //! The file has no mark of its own: it is known by its length.
 
 use super::cache::{CacheFormat, CacheHeader, CacheSource, check_length, small};
+use super::rate;
 use crate::diag::{Diagnostic, Result};
 
 /// MDD.
@@ -52,7 +53,7 @@ impl CacheFormat for Mdd {
             .0
             .iter()
             .map(|bytes| f32::from_be_bytes(*bytes));
-        header.fps = rate(&times.collect::<Vec<_>>());
+        header.fps = rate::of_times(&times.collect::<Vec<_>>());
         Ok(header)
     }
 
@@ -75,81 +76,5 @@ impl CacheFormat for Mdd {
     fn encode(&self, positions: &[f32], bytes: &mut Vec<u8>) {
         bytes.clear();
         bytes.extend(positions.iter().flat_map(|value| value.to_be_bytes()));
-    }
-}
-
-/// Frames per second of equally spaced times, `None` if they are not. The times are f32, so the rate is
-/// known to about 2^-23; the roundest number within that is taken (24, 29.97, 24000/1001, ..).
-pub(super) fn rate(times: &[f32]) -> Option<f64> {
-    let (first, last) = (f64::from(*times.first()?), f64::from(*times.last()?));
-    let steps = (times.len() - 1) as f64;
-    let span = last - first;
-    if !(span > 0.0 && span.is_finite()) {
-        return None;
-    }
-    let half_ulp = f64::from(f32::EPSILON) / 2.0 * first.abs().max(last.abs());
-    let step = span / steps;
-    let even = times.iter().enumerate().all(|(at, &time)| {
-        let expected = first + at as f64 * step;
-        (f64::from(time) - expected).abs() <= (0.01 * step).max(3.0 * half_ulp)
-    });
-    let fps = steps / span;
-    let known = fps * 2.0 * half_ulp / span;
-    even.then(|| round_rate(fps, known))
-}
-
-/// The roundest rate within `error` of `fps`: whole, with three decimals, a whole one times 1000/1001,
-/// else as it is.
-fn round_rate(fps: f64, error: f64) -> f64 {
-    let error = error.max(4.0 * f64::EPSILON * fps);
-    let candidates = [
-        fps.round(),
-        (fps * 100.0).round() / 100.0,
-        (fps * 1000.0).round() / 1000.0,
-        (fps * 1.001).round() * 1000.0 / 1001.0,
-    ];
-    let near = candidates
-        .into_iter()
-        .find(|rate| *rate > 0.0 && (rate - fps).abs() <= error);
-    near.unwrap_or(fps)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rates_come_back_from_times() {
-        let ntsc = |fps: f64| fps * 1000.0 / 1001.0;
-        for fps in [
-            24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 120.0, 23.976, 29.97, 59.94, 12.5,
-        ] {
-            for frames in [2, 3, 48, 1000, 100_000] {
-                let times: Vec<f32> = (0..frames).map(|i| (f64::from(i) / fps) as f32).collect();
-                let found = rate(&times).unwrap();
-                // with few frames NTSC rates and their three decimals are closer than an f32 can tell
-                assert!(
-                    (found - fps).abs() <= 2e-6 * fps,
-                    "{frames} frames: {found}, not {fps}"
-                );
-                if fps.fract() == 0.0 {
-                    assert_eq!(found, fps);
-                }
-            }
-        }
-        let times: Vec<f32> = (0..500)
-            .map(|i| (f64::from(i) / ntsc(24.0)) as f32)
-            .collect();
-        assert_eq!(rate(&times), Some(ntsc(24.0)));
-    }
-
-    #[test]
-    fn times_that_tell_no_rate_tell_none() {
-        assert_eq!(rate(&[0.0, 0.0, 0.0]), None);
-        assert_eq!(rate(&[0.0]), None);
-        assert_eq!(rate(&[0.0, 1.0, 3.0]), None);
-        assert_eq!(rate(&[0.0, f32::NAN, 1.0]), None);
-        assert_eq!(rate(&[0.0, f32::INFINITY]), None);
-        assert_eq!(rate(&[1.0, 0.5, 0.0]), None);
     }
 }

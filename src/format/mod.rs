@@ -5,16 +5,18 @@
 
 pub mod cache;
 mod face_check;
+pub mod gltf;
 pub mod loom;
 pub mod mdd;
 pub mod obj;
 pub mod pc2;
 pub mod ply;
+mod rate;
 
 use std::sync::Arc;
 
-use crate::diag::{Diagnostic, Result};
-use crate::mesh::Topology;
+use crate::diag::{Diagnostic, Result, Warned};
+use crate::mesh::{Sequence, Topology};
 
 pub use cache::CacheFormat;
 pub use face_check::{FaceRun, FirstFrame};
@@ -39,6 +41,8 @@ pub enum Kind {
     Mesh(&'static dyn MeshFormat),
     /// Frames without faces.
     Cache(&'static dyn CacheFormat),
+    /// A scene that moves: frames with faces, read only.
+    Scene(&'static dyn SceneFormat),
 }
 
 /// All formats.
@@ -66,6 +70,12 @@ pub const FORMATS: &[Format] = &[
         endings: &["mdd"],
         recognises: |_| false,
         kind: Kind::Cache(&mdd::Mdd),
+    },
+    Format {
+        name: "glTF",
+        endings: &["glb", "gltf"],
+        recognises: |head| head.starts_with(b"glTF"),
+        kind: Kind::Scene(&gltf::Gltf),
     },
 ];
 
@@ -96,6 +106,21 @@ pub trait MeshFormat: Sync {
 
     /// Whatever writes frames of this connectivity; what all frames share is formatted once, here.
     fn writer(&self, topology: &Arc<Topology>, options: WriteOptions) -> Box<dyn FrameWriter>;
+}
+
+/// A file, and files that it names, to frames.
+pub trait SceneFormat: Sync {
+    /// All frames of one animation; the first if `animation` is none. `resource` fetches a file by the
+    /// name that the scene gives it, relative to the scene.
+    ///
+    /// # Errors
+    /// The file is damaged, there is no such animation, or nothing in it has faces.
+    fn read(
+        &self,
+        bytes: &[u8],
+        animation: Option<&str>,
+        resource: &dyn Fn(&str) -> Result<Vec<u8>>,
+    ) -> Result<Warned<Sequence>>;
 }
 
 /// How to write.

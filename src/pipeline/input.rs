@@ -101,6 +101,8 @@ pub(super) struct Files {
     pub(super) format: &'static Format,
     /// The mesh that stands beside a cache.
     pub(super) mesh: Option<PathBuf>,
+    /// The animation of a scene: `FILE#NAME`.
+    pub(super) animation: Option<String>,
     pub(super) warnings: Vec<Diagnostic>,
 }
 
@@ -113,7 +115,13 @@ pub(super) fn find(world: &dyn World, spec: &InputSpec) -> Result<Files> {
         [one] => match world.identity(one)? {
             Some(found) if found.folder => in_folder(world, one),
             Some(_) => listed(vec![one.clone()]),
-            None => matching(world, one),
+            None => match animation(world, one)? {
+                Some((file, animation)) => Ok(Files {
+                    animation: Some(animation),
+                    ..listed(vec![file])?
+                }),
+                None => matching(world, one),
+            },
         },
         many => {
             for path in many {
@@ -131,6 +139,18 @@ pub(super) fn find(world: &dyn World, spec: &InputSpec) -> Result<Files> {
             listed(many.to_vec())
         }
     }
+}
+
+/// `FILE#NAME` with a scene that exists.
+fn animation(world: &dyn World, path: &Path) -> Result<Option<(PathBuf, String)>> {
+    let text = path.to_string_lossy();
+    let Some((file, animation)) = text.split_once('#') else {
+        return Ok(None);
+    };
+    let file = PathBuf::from(file);
+    let scene = format_of(&file).is_ok_and(|format| matches!(format.kind, Kind::Scene(_)));
+    let there = scene && world.identity(&file)?.is_some();
+    Ok(there.then(|| (file, animation.to_string())))
 }
 
 /// Files in the order given, all of one format; or one cache and the mesh it belongs to.
@@ -159,6 +179,7 @@ fn listed(mut paths: Vec<PathBuf>) -> Result<Files> {
         paths,
         format,
         mesh,
+        animation: None,
         warnings,
     })
 }

@@ -7,8 +7,8 @@ use super::input::{self, Files, InputSpec};
 use super::lanes;
 use crate::diag::{Diagnostic, Result, Warned};
 use crate::format::cache::CacheSource;
-use crate::format::{self, CacheFormat, FirstFrame, Kind, MeshFormat};
-use crate::mesh::Sequence;
+use crate::format::{self, CacheFormat, FirstFrame, Kind, MeshFormat, SceneFormat};
+use crate::mesh::{FrameSource, Sequence};
 use crate::task::Task;
 use crate::world::World;
 
@@ -45,12 +45,13 @@ pub struct Origin {
 /// Nothing is there, what is there cannot be told apart, a file is damaged, or the frames do not share
 /// one connectivity. Cancellation.
 pub fn open(world: &dyn World, spec: &InputSpec, task: &Task) -> Result<Warned<Capture>> {
-    let files = input::find(world, spec)?;
+    let mut files = input::find(world, spec)?;
     let (sequence, origin) = match files.format.kind {
         Kind::Mesh(format) => read_meshes(world, spec, &files, format, task)?,
         Kind::Cache(format) => read_cache(world, spec, &files, format, task)?,
+        Kind::Scene(format) => read_scene(world, spec, &mut files, format, task)?,
     };
-    let fps = spec.fps.or(crate::mesh::FrameSource::fps(&sequence));
+    let fps = spec.fps.or(sequence.fps());
     Ok(Warned {
         output: Capture {
             content: Content::Sequence(sequence.with_fps(fps)),
@@ -68,12 +69,7 @@ fn read_meshes(
     format: &dyn MeshFormat,
     task: &Task,
 ) -> Result<(Sequence, Origin)> {
-    if let Some(mesh) = &spec.mesh {
-        return Diagnostic::error("a mesh is given for files that have faces of their own")
-            .in_file(mesh)
-            .hint("leave --mesh out: it is for point caches")
-            .err();
-    }
+    no_mesh(spec)?;
     let range = spec.range.unwrap_or_default().within(files.paths.len())?;
     let paths = &files.paths[range];
     task.phase("load", paths.len());
@@ -161,6 +157,57 @@ fn read_cache(
         bytes: source.length,
     };
     Ok((Sequence::new(base.topology, positions, header.fps), origin))
+}
+
+/// One animation of a scene.
+fn read_scene(
+    world: &dyn World,
+    spec: &InputSpec,
+    files: &mut Files,
+    format: &dyn SceneFormat,
+    task: &Task,
+) -> Result<(Sequence, Origin)> {
+    no_mesh(spec)?;
+    let [path] = files.paths.as_slice() else {
+        return Diagnostic::error("several scenes are not one capture")
+            .in_file(&files.paths[1])
+            .hint("choose one of them")
+            .err();
+    };
+    task.phase("load", 1);
+    let bytes = world.read(path)?;
+    let resource = |name: &str| world.read(&input::parent(path).join(name));
+    let read = format.read(&bytes, files.animation.as_deref(), &resource);
+    let read = read.map_err(|error| match error.place.file {
+        Some(_) => error,
+        None => in_file(error, path, &bytes),
+    })?;
+    let warnings = read.warnings.into_iter();
+    files
+        .warnings
+        .extend(warnings.map(|warning| warning.in_file(path)));
+    let sequence = read.output;
+    let range = spec.range.unwrap_or_default().within(sequence.frames())?;
+    for frame in range.clone() {
+        finite(sequence.frame(frame), frame).map_err(|error| Box::new(error.in_file(path)))?;
+    }
+    let origin = Origin {
+        format: files.format.name,
+        files: vec![path.clone()],
+        bytes: bytes.len() as u64,
+    };
+    Ok((sequence.slice(range), origin))
+}
+
+/// Refuses a mesh for files that have faces.
+fn no_mesh(spec: &InputSpec) -> Result<()> {
+    match &spec.mesh {
+        None => Ok(()),
+        Some(mesh) => Diagnostic::error("a mesh is given for files that have faces of their own")
+            .in_file(mesh)
+            .hint("leave --mesh out: it is for point caches")
+            .err(),
+    }
 }
 
 /// Refuses coordinates of `frame` (from 0) that are not finite.

@@ -141,6 +141,9 @@ fn plan_writes(world: &dyn World, out: &Path, frames: usize) -> Result<Plan> {
 
 fn one_file(out: &Path, frames: usize) -> Result<Plan> {
     let format = format_of(out)?;
+    if matches!(format.kind, Kind::Scene(_)) {
+        return not_written(format, out).err();
+    }
     if frames != 1 && matches!(format.kind, Kind::Mesh(_)) {
         let folder = out.with_extension("");
         return Diagnostic::error(format!(
@@ -162,6 +165,13 @@ fn one_file(out: &Path, frames: usize) -> Result<Plan> {
         format: FormatOf(format),
         stage: out.to_path_buf(),
     })
+}
+
+/// What is said of a format that is read only.
+pub(super) fn not_written(format: &Format, out: &Path) -> Diagnostic {
+    Diagnostic::error(format!("{} files cannot be written yet", format.name))
+        .in_file(out)
+        .hint("write .pc2, .mdd, or a file a frame: frame_####.obj")
 }
 
 /// An existing folder, a name that ends in a separator, or one without an ending.

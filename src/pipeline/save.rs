@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use super::lanes;
 use super::open::finite;
-use super::output::{Output, Plan, plan};
+use super::output::{Output, Plan, not_written, plan};
 use crate::diag::{Diagnostic, Result};
 use crate::format::cache::CacheHeader;
 use crate::format::{CacheFormat, FrameWriter, Kind, WriteOptions};
@@ -52,6 +52,7 @@ pub fn save(
             write_meshes(&*stage, source, &*writer, task)?;
         }
         Kind::Cache(format) => write_cache(&*stage, source, format, task)?,
+        Kind::Scene(_) => return not_written(plan.format.0, &output.path).err(),
     }
     task.check()?;
     let names = (0..plan.writes.len()).map(|file| file.to_string());
