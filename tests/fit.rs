@@ -112,6 +112,23 @@ fn the_reported_total_is_what_the_frames_say() {
 }
 
 #[test]
+fn the_frames_errors_have_the_total_as_their_mean() {
+    let sequence = swing(30, 60);
+    for options in [given(12, 20, 4), given(32, 30, 29)] {
+        let loom = fit::fit(&sequence, &options, &Task::default())
+            .unwrap()
+            .output;
+        let squares: f64 = loom.frame_errors().iter().map(|error| error * error).sum();
+        let total = loom.report().error.total;
+        // squares of frames differ from those of the whole by rounding of the motion's own
+        assert!(
+            (squares / 30.0 - total * total).abs() < 1e-14,
+            "{squares} {total}"
+        );
+    }
+}
+
+#[test]
 fn with_an_exact_time_signal_shape_and_pose_errors_add_up() {
     let fitted = fit(&swing(30, 60), &given(32, 12, 5));
     let (shape, pose) = (fitted.errors.shape, fitted.errors.pose);

@@ -12,7 +12,8 @@
 //! time/spans [n] u32, time/offsets [n], time/slopes [n]  rho: place and slope of every frame
 //! time/warp/0 ..             [keys 3] f64: output time, source time, slope; [1] u32: reversed, n
 //! root/pivot [3], root/rotations [n 4] (w x y z), root/positions [n 3], root/spins, root/slopes f64
-//! layout/positions [N 2], layout/coordinates [N m] f64, layout/pins [P] u32 (from 0), layout/pinned [P 2]
+//! layout/positions [N 2], layout/coordinates [N m], layout/residuals [N] f64
+//! layout/pins [P] u32 (from 0), layout/pinned [P 2] f64
 //! ```
 
 use std::collections::BTreeMap;
@@ -286,6 +287,7 @@ impl Writer {
         self.points("layout/positions", &layout.positions);
         let n = layout.positions.len();
         self.f64("layout/coordinates", &[n, m], layout.coordinates.clone());
+        self.f64("layout/residuals", &[n], layout.residuals.clone());
         self.u32("layout/pins", layout.pins.iter().map(|(frame, _)| *frame));
         let pinned: Vec<Point> = layout.pins.iter().map(|(_, p)| *p).collect();
         self.points("layout/pinned", &pinned);
@@ -592,6 +594,7 @@ impl Reader {
     fn layout(&mut self, m: usize) -> Result<Layout> {
         let positions = self.points("layout/positions")?;
         let coordinates = self.f64("layout/coordinates", &[positions.len(), m])?;
+        let residuals = self.f64("layout/residuals", &[positions.len()])?;
         let (pins, pinned) = (self.indices("layout/pins")?, self.points("layout/pinned")?);
         if pins.len() != pinned.len() {
             return Err(faulty(
@@ -603,13 +606,15 @@ impl Reader {
             .iter()
             .chain(&pinned)
             .flatten()
-            .chain(&coordinates);
+            .chain(&coordinates)
+            .chain(&residuals);
         if !numbers.into_iter().all(|x| x.is_finite()) {
             return Err(faulty("layout", "a number is not finite"));
         }
         Ok(Layout {
             positions,
             coordinates,
+            residuals,
             pins: pins.into_iter().zip(pinned).collect(),
         })
     }

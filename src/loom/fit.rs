@@ -209,6 +209,7 @@ fn layout(fitted: &Fitted, pins: &[Pin]) -> Layout {
     Layout {
         positions: positions.clone(),
         coordinates: fitted.subspace.x.clone(),
+        residuals: fitted.subspace.residuals.clone(),
         pins: pins.iter().map(held).collect(),
     }
 }

@@ -40,6 +40,8 @@ pub struct Layout {
     pub positions: Vec<Point>,
     /// x_i, n rows of m.
     pub coordinates: Vec<f64>,
+    /// ||z_i - h(x_i)||, n numbers: what the shape signal leaves out of each frame.
+    pub residuals: Vec<f64>,
     /// Frames (from 0) that were put where they are.
     pub pins: Vec<(usize, Point)>,
 }
@@ -103,7 +105,7 @@ impl Loom {
                 "the pose signal is not of the shape subspace",
             ),
             (
-                layout.coordinates.len() == n * m && pinned,
+                layout.coordinates.len() == n * m && layout.residuals.len() == n && pinned,
                 "the layout has other counts",
             ),
             (
@@ -176,6 +178,37 @@ impl Loom {
     /// What the fit said about itself.
     pub fn report(&self) -> &Arc<FitReport> {
         &self.parts.report
+    }
+
+    /// ||z_i - psi(i)|| of each frame that was fitted, over the root mean square distance of the frames from
+    /// their mean: the root mean square of these is the report's total error. Nothing where the time was
+    /// edited so that its frames are others, and zeros where nothing moves.
+    pub fn frame_errors(&self) -> Vec<f64> {
+        let Parts {
+            time, pose, layout, ..
+        } = &self.parts;
+        let (n, m) = (layout.positions.len(), self.parts.shape.modes());
+        if n == 0 || time.places().len() != n || !time.warps().is_empty() {
+            return Vec::new();
+        }
+        let square = |values: &[f64]| values.iter().map(|x| x * x).sum::<f64>();
+        let spread = square(&layout.coordinates) + square(&layout.residuals);
+        let mut x = vec![0.0; m];
+        let mut error = |frame: usize| -> Option<f64> {
+            pose.evaluate(time.at((frame + 1) as f64)?, &mut x);
+            let target = &layout.coordinates[frame * m..(frame + 1) * m];
+            x.iter_mut()
+                .zip(target)
+                .for_each(|(x, target)| *x -= target);
+            let outside = layout.residuals[frame] * layout.residuals[frame];
+            let missed = (square(&x) + outside) * n as f64;
+            Some(if spread > 0.0 {
+                (missed / spread).sqrt()
+            } else {
+                0.0
+            })
+        };
+        (0..n).filter_map(&mut error).collect()
     }
 
     /// n: time runs over \[1, n\].
@@ -479,6 +512,7 @@ pub(crate) mod test_looms {
             layout: Arc::new(Layout {
                 positions,
                 coordinates,
+                residuals: vec![0.01; n],
                 pins: vec![(2, [0.5, 0.25])],
             }),
             report: Arc::new(FitReport {

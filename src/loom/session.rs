@@ -79,6 +79,7 @@ impl Session {
             x: fitted.coordinates.clone(),
             spread,
             residual: left_out * spread,
+            residuals: fitted.residuals.clone(),
         };
         Ok(Session {
             distances: subspace.distances(),
@@ -121,6 +122,7 @@ impl Session {
             layout: Arc::new(Fitted {
                 positions: signals.layout.positions,
                 coordinates: self.subspace.x.clone(),
+                residuals: self.subspace.residuals.clone(),
                 pins: self.pins.clone(),
             }),
             pose: Arc::new(signals.pose),

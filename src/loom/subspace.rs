@@ -20,6 +20,8 @@ pub struct Subspace {
     pub spread: f64,
     /// The root of (3), sum ||z_i - h(x_i)||^2.
     pub residual: f64,
+    /// ||z_i - h(x_i)|| of each frame; nothing where that is not known.
+    pub residuals: Vec<f64>,
 }
 
 impl Subspace {
@@ -31,6 +33,7 @@ impl Subspace {
             x: basis.coordinates.clone(),
             spread: pca.spread(),
             residual: basis.residual,
+            residuals: basis.residuals.clone(),
         }
     }
 
@@ -44,12 +47,14 @@ impl Subspace {
     pub fn truncated(&self, modes: usize) -> Self {
         let modes = modes.min(self.modes);
         let rows = || (0..self.frames).map(|frame| self.row(frame));
-        let dropped = rows().flat_map(|row| &row[modes..]).map(|x| x * x);
-        let squares = self.residual * self.residual + dropped.sum::<f64>();
+        let square = |row: &[f64]| row[modes..].iter().map(|x| x * x).sum::<f64>();
+        let dropped: f64 = rows().map(square).sum();
+        let joined = |(residual, row): (&f64, &[f64])| (residual * residual + square(row)).sqrt();
         Subspace {
             modes,
             x: rows().flat_map(|row| &row[..modes]).copied().collect(),
-            residual: squares.sqrt(),
+            residual: (self.residual * self.residual + dropped).sqrt(),
+            residuals: self.residuals.iter().zip(rows()).map(joined).collect(),
             ..*self
         }
     }

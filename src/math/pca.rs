@@ -145,6 +145,8 @@ pub struct Basis {
     pub coordinates: Vec<f64>,
     /// ||Y - X H^T||, the root of (3).
     pub residual: f64,
+    /// ||y_i - H x_i|| of each row: their squares sum to that of `residual`, up to 1e-15 ||Y||^2.
+    pub residuals: Vec<f64>,
     /// The number of modes above 1e-13 ||Y||. Where no mode below 1e-6 ||Y|| was asked for, those are
     /// not told from rounding and not counted.
     pub rank: usize,
@@ -257,13 +259,14 @@ impl Pca {
         }
         let mut x = self.coordinates(rows, h.as_ref(), task)?;
         fix_signs(h.as_mut(), x.as_mut());
-        let residual = self.distance(rows, h.as_ref(), x.as_ref(), task)?;
+        let (residual, residuals) = self.distances(rows, h.as_ref(), x.as_ref(), task)?;
         let coordinates = (0..n * m).map(|at| x[(at / m, at % m)]).collect();
         Ok(Basis {
             vectors,
             modes: m,
             coordinates,
             residual,
+            residuals,
             rank,
         })
     }
@@ -330,22 +333,25 @@ impl Pca {
         })
     }
 
-    /// ||Y - X H^T||: by Pythagoras, or, where little is left and that would be rounding, from the rows.
-    fn distance(
+    /// ||Y - X H^T|| and the same of each row: by Pythagoras, or, where little is left and that would be rounding, from the rows.
+    fn distances(
         &self,
         rows: &dyn Rows,
         h: MatRef<'_, f64>,
         x: MatRef<'_, f64>,
         task: &Task,
-    ) -> Result<f64, PcaError> {
+    ) -> Result<(f64, Vec<f64>), PcaError> {
         let whole = self.spread * self.spread;
         let left_out = whole - x.squared_norm_l2();
         // the difference errs by some 1e-15 of the whole: below 1e-11 of it that would show
         if left_out > 1e-11 * whole || whole == 0.0 {
-            return Ok(left_out.max(0.0).sqrt());
+            let each = (0..self.rows()).map(|i| self.square(i) - x.row(i).squared_norm_l2());
+            let each = each.map(|square| square.max(0.0).sqrt()).collect();
+            return Ok((left_out.max(0.0).sqrt(), each));
         }
-        let panels = Panels::of(self.rows(), self.mean.len(), h.ncols());
-        let squares = panels.sum(task, 1, 1, |columns, mut sum, buffer| {
+        let n = self.rows();
+        let panels = Panels::of(n, self.mean.len(), h.ncols());
+        let squares = panels.sum(task, n, 1, |columns, mut sum, buffer| {
             let part = h.get(columns.clone(), ..);
             let mut panel = centred(rows, &self.mean, columns, buffer).to_owned();
             matmul(
@@ -356,9 +362,19 @@ impl Pca {
                 -1.0,
                 Par::Seq,
             );
-            sum[(0, 0)] += panel.squared_norm_l2();
+            for i in 0..n {
+                sum[(i, 0)] += panel.col(i).squared_norm_l2();
+            }
         })?;
-        Ok(squares[(0, 0)].sqrt())
+        let each = (0..n).map(|i| squares[(i, 0)].sqrt()).collect();
+        Ok(((0..n).map(|i| squares[(i, 0)]).sum::<f64>().sqrt(), each))
+    }
+
+    /// ||y_i||^2.
+    fn square(&self, row: usize) -> f64 {
+        let entries = self.singular.iter().enumerate();
+        let entries = entries.map(|(j, size)| self.left[(row, j)] * size);
+        entries.map(|entry| entry * entry).sum()
     }
 }
 
@@ -589,7 +605,7 @@ mod tests {
         let z = DMatrix::from_row_slice(n, d, &values);
         let mean = z.row_mean();
         let y = DMatrix::from_fn(n, d, |i, c| z[(i, c)] - mean[c]);
-        let svd = y.svd(true, true);
+        let svd = y.clone().svd(true, true);
         for (j, value) in pca.singular_values().iter().take(6).enumerate() {
             // eigenvalues of the Gram matrix err by about 1e-15 of the largest
             let expected = svd.singular_values[j];
@@ -602,6 +618,15 @@ mod tests {
         }
         let left_out: f64 = svd.singular_values.iter().skip(3).map(|s| s * s).sum();
         assert!((basis.residual - left_out.sqrt()).abs() < 1e-12 * pca.spread());
+        for (i, residual) in basis.residuals.iter().enumerate() {
+            let rest = |c: usize| {
+                let kept = |j: usize| basis.coordinates[i * 3 + j] * basis.vectors[j * d + c];
+                y[(i, c)] - (0..3).map(kept).sum::<f64>()
+            };
+            let left_out = (0..d).map(|c| rest(c).powi(2)).sum::<f64>().sqrt();
+            // squares differ by rounding of the whole, their roots by at most its root
+            assert!((residual - left_out).abs() < 1e-7 * pca.spread());
+        }
         assert!((pca.residual(3) - left_out.sqrt()).abs() < 1e-12 * pca.spread());
     }
 
@@ -617,6 +642,12 @@ mod tests {
                 assert!(orthonormality(&basis, d) < 1e-13, "ratio {ratio}");
                 assert!(defect(&values, d, &pca, &basis) < 1e-11, "ratio {ratio}");
                 assert!(basis.residual < 1e-11 * pca.spread());
+                let squares: f64 = basis
+                    .residuals
+                    .iter()
+                    .map(|residual| residual.powi(2))
+                    .sum();
+                assert!((squares.sqrt() - basis.residual).abs() <= 1e-12 * basis.residual);
             }
         }
     }

@@ -1,5 +1,6 @@
 //! A loom's signals as the plain series that plots are drawn from, and the figure of both.
 
+use crate::loom::Loom;
 use crate::math::b_spline::Point;
 use crate::plot::{Anchor, PoseSpace, Scene, Theme, TimeSignals, pose_space, time_signals};
 use crate::signal::pose::PoseSignal;
@@ -21,6 +22,25 @@ const SMOOTH: usize = 24;
 
 /// Samples of the whole curve: beyond, a picture shows no difference.
 const SAMPLES: usize = 2400;
+
+/// Map and time signals of a loom, as [`series`].
+pub fn plot_loom(loom: &Loom) -> (PoseSpace, TimeSignals) {
+    let fitted = Fitted {
+        positions: &loom.layout().positions,
+        pins: &loom.layout().pins,
+        errors: &loom.frame_errors(),
+    };
+    series(loom.time(), loom.pose(), &fitted)
+}
+
+/// One line about a loom: what it has and how well it fits.
+pub fn caption(loom: &Loom) -> String {
+    let (k, l) = (loom.time().controls().len(), loom.pose().sites().len());
+    let (n, m) = (loom.frames(), loom.shape().modes());
+    let error = 100.0 * loom.report().error.total;
+    let frames = if n == 1 { "frame" } else { "frames" };
+    format!("{n} {frames}, k = {k}, l = {l}, m = {m}; total error {error:.3} %")
+}
 
 /// Map and time signals of f and g. What was `fitted` is shown where it still belongs to the frames: an
 /// edit that changes their number leaves positions f(i) and no errors.
@@ -142,6 +162,7 @@ pub fn figure(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::loom::test_looms::ring;
     use crate::math::thin_plate::Rows;
     use crate::plot::Item;
     use crate::signal::warp::Warp;
@@ -185,6 +206,17 @@ mod tests {
         }
         assert_eq!(plots.rho.len(), plots.times.len());
         assert_eq!(plots.error.len(), 12);
+    }
+
+    #[test]
+    fn a_loom_is_plotted_with_what_it_was_fitted_to() {
+        let loom = ring(20, 15, false);
+        let (map, plots) = plot_loom(&loom);
+        assert_eq!(map.frames, loom.layout().positions);
+        assert_eq!(map.sites, loom.pose().sites());
+        assert_eq!(map.pins, [(3, [0.5, 0.25])]);
+        assert_eq!(plots.frames.len(), loom.frames());
+        assert!(caption(&loom).starts_with("15 frames, k = "));
     }
 
     #[test]

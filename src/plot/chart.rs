@@ -1,6 +1,6 @@
 //! Curves over a common horizontal axis, one panel below the other.
 
-use super::axes::{Axis, Plane, Scale, Ticks, bottom_margin, left_margin, padded, range_of};
+use super::axes::{Axis, Plane, Scale, Tick, Ticks, bottom_margin, left_margin, padded, range_of};
 use super::legend::{Legend, Mark};
 use super::scene::{Path, Point, Rect, Scene, Stroke};
 use super::theme::{Theme, Tint};
@@ -57,6 +57,8 @@ pub struct Chart {
     pub scale: Scale,
     /// Its ends; `None`: as the data asks for.
     pub range: Option<[f64; 2]>,
+    /// What is written at which values of x; `None`: round numbers.
+    pub names: Option<Vec<Tick>>,
     /// From top to bottom.
     pub panels: Vec<Panel>,
     /// Values of x marked by short strokes at the foot of the first panel, and what they are.
@@ -75,7 +77,7 @@ pub fn chart(chart: &Chart, width: f32, height: f32, theme: &Theme) -> (Scene, V
     let planes = chart.planes(Rect::new(0.0, top, width, height - top), theme);
     let last = planes.len().saturating_sub(1);
     for (i, (panel, (plane, y))) in chart.panels.iter().zip(&planes).enumerate() {
-        let x = plane.x.fitting(plane.area.width, 4.5, None, theme);
+        let x = chart.ticks(plane, theme);
         plane.draw_grid(&mut scene, theme, &x, y);
         if i == 0 {
             chart.draw_rug(&mut scene, plane, theme);
@@ -136,6 +138,16 @@ impl Chart {
             (Plane { area, x, y }, ticks)
         })
         .collect()
+    }
+
+    fn ticks(&self, plane: &Plane, theme: &Theme) -> Ticks {
+        match &self.names {
+            Some(names) => Ticks {
+                marks: names.clone(),
+                exponent: 0,
+            },
+            None => plane.x.fitting(plane.area.width, 4.5, None, theme),
+        }
     }
 
     fn axis(&self, pixels: [f32; 2]) -> Axis {
@@ -290,7 +302,12 @@ impl Series {
     /// Discs become smaller where many stand side by side.
     fn radius(&self, plane: &Plane, theme: &Theme) -> f32 {
         let spacing = plane.area.width / self.points.len().max(1) as f32;
-        (0.35 * spacing).clamp(1.1 * theme.unit(), 2.4 * theme.unit())
+        let largest = if spacing > 60.0 * theme.unit() {
+            4.0
+        } else {
+            2.4
+        };
+        (0.35 * spacing).clamp(1.1 * theme.unit(), largest * theme.unit())
     }
 }
 

@@ -31,6 +31,10 @@ pub struct PoseSpace {
     pub pins: Vec<(usize, [f64; 2])>,
     /// Frames, from 1, that are numbered before all others and drawn larger.
     pub shown: Vec<usize>,
+    /// Points set off from all others, without numbers.
+    pub marked: Vec<[f64; 2]>,
+    /// Times between which the curve is set off, the first below the second.
+    pub span: Option<[f64; 2]>,
     /// Small pictures behind the curve: where their middles lie, and how wide they are in data units.
     pub pictures: Vec<([f64; 2], f64, Arc<Image>)>,
     /// Which part of the plane to show: x range, y range. `None` shows everything.
@@ -76,7 +80,13 @@ pub fn pose_space(map: &PoseSpace, width: f32, height: f32, theme: &Theme) -> (S
 impl PoseSpace {
     fn points(&self) -> impl Iterator<Item = [f64; 2]> + '_ {
         let pins = self.pins.iter().map(|(_, at)| at);
-        let lists = [&self.curve, &self.frames, &self.sites, &self.controls];
+        let lists = [
+            &self.curve,
+            &self.frames,
+            &self.sites,
+            &self.controls,
+            &self.marked,
+        ];
         let pictures = self.pictures.iter().flat_map(|(at, wide, _)| {
             let half = 0.5 * wide;
             [[at[0] - half, at[1] - half], [at[0] + half, at[1] + half]]
@@ -163,6 +173,12 @@ impl PoseSpace {
         places.dedup_by(|next, kept| distance(next.0, kept.0) < 0.8); // no step that could be seen
         let points: Vec<Point> = places.iter().map(|(at, _)| *at).collect();
         let arrows = arrows(&points, theme);
+        if let Some([from, to]) = self.span {
+            let inside = places.iter().filter(|(_, t)| (from..=to).contains(t));
+            let inside: Vec<Point> = inside.map(|(at, _)| *at).collect();
+            let wide = Stroke::new(theme.ink.with_alpha(0.85), 6.5 * theme.unit());
+            scene.stroke(Path::polyline(&inside), wide);
+        }
         scene.items.push(Item::Curve {
             points,
             colors: places.iter().map(|(_, t)| color(*t)).collect(),
@@ -188,7 +204,8 @@ impl PoseSpace {
         let marks = Marks::of(theme);
         self.draw_dots(scene, plane, theme);
         let shown = self.shown.iter().filter_map(|&frame| self.place(frame));
-        for at in shown {
+        let marked = self.marked.iter().filter(|at| finite(at)).copied();
+        for at in shown.chain(marked) {
             let rim = Stroke::new(theme.background, theme.unit());
             scene.ring(
                 plane.pixel(at),

@@ -1,0 +1,221 @@
+//! What the figures share: the capture (a demo, or a path on the command line), fitting, small pictures of
+//! shapes, tables beside the paper's numbers, goals, and the folder that pictures go to.
+//!
+//! ```text
+//! cargo run --release --example figure1_horse [CAPTURE] [--out FOLDER]
+//! ```
+#![allow(dead_code)] // every figure uses its part
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use meshloom::demo::Demo;
+use meshloom::diag::{Diagnostic, Result};
+use meshloom::image::Image;
+use meshloom::io::Disk;
+use meshloom::mesh::{FrameSource, Sequence, Topology};
+use meshloom::pipeline::{self, Content, InputSpec, PictureFormat};
+use meshloom::plot::{Item, Path, Point, Rect, Scene, Stroke, Theme};
+use meshloom::task::Task;
+use meshloom::view::{self, Bounds, Camera, Style, Surface};
+
+/// A figure under way.
+pub(crate) struct Figure {
+    name: &'static str,
+    capture: Option<PathBuf>,
+    folder: PathBuf,
+    missed: usize,
+}
+
+/// Runs `draw`: exit code 0, or 1 if it failed or missed a goal.
+pub(crate) fn run(name: &'static str, draw: impl FnOnce(&mut Figure) -> Result<()>) -> ExitCode {
+    let mut arguments = std::env::args_os().skip(1);
+    let mut figure = Figure {
+        name,
+        capture: None,
+        folder: PathBuf::from("target/figures"),
+        missed: 0,
+    };
+    while let Some(argument) = arguments.next() {
+        match (argument.to_str(), &figure.capture) {
+            (Some("--out"), _) => figure.folder = arguments.next().unwrap_or_default().into(),
+            (Some(option), _) if option.starts_with('-') => {
+                eprintln!("usage: {name} [CAPTURE] [--out FOLDER]");
+                return ExitCode::from(2);
+            }
+            (_, None) => figure.capture = Some(argument.into()),
+            (_, Some(_)) => {
+                eprintln!("usage: {name} [CAPTURE] [--out FOLDER]");
+                return ExitCode::from(2);
+            }
+        }
+    }
+    match draw(&mut figure) {
+        Ok(()) if figure.missed == 0 => ExitCode::SUCCESS,
+        Ok(()) => ExitCode::FAILURE,
+        Err(error) => {
+            eprintln!("{error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+impl Figure {
+    /// The capture of the command line, or else the demo of that name; and how to look at it.
+    pub(crate) fn capture(&self, demo: &str) -> Result<(Sequence, View)> {
+        let (sequence, direction) = match (&self.capture, Demo::find(demo)) {
+            (Some(path), _) => {
+                let opened = pipeline::open(&Disk, &InputSpec::new(path), &Task::default())?;
+                match opened.output.content {
+                    Content::Sequence(sequence) => (sequence, [0.6, 0.25]),
+                }
+            }
+            (None, Some(demo)) => ((demo.generate)(), demo.view),
+            (None, None) => return Diagnostic::error(format!("no demo `{demo}`")).err(),
+        };
+        let view = View::of(&sequence, direction);
+        Ok((sequence, view))
+    }
+
+    /// Whether the capture is the demo, whose numbers are known.
+    pub(crate) fn is_demo(&self) -> bool {
+        self.capture.is_none()
+    }
+
+    /// States a goal, and whether it is met: if not, the figure's exit code will be 1.
+    pub(crate) fn goal(&mut self, statement: &str, met: bool) {
+        println!("{} {statement}", if met { "met:   " } else { "MISSED:" });
+        self.missed += usize::from(!met);
+    }
+
+    /// Writes a picture as PNG and SVG, named after the figure.
+    pub(crate) fn picture(&self, scene: &Scene) -> Result<()> {
+        for ending in ["png", "svg"] {
+            let path = self.folder.join(self.name).with_extension(ending);
+            pipeline::save_picture(&Disk, scene, &path.clone().into(), 2.0)?;
+            println!("wrote {}", path.display());
+        }
+        PictureFormat::of(&self.folder.join("a.png")).map(|_| ())
+    }
+}
+
+/// Every `step`-th frame, from the first on.
+pub(crate) fn every(sequence: &Sequence, step: usize) -> Sequence {
+    let kept = (0..sequence.frames()).step_by(step);
+    let positions = kept.flat_map(|frame| sequence.frame(frame).to_vec());
+    let fps = sequence.fps().map(|fps| fps / step as f64);
+    Sequence::new(sequence.topology().clone(), positions.collect(), fps)
+}
+
+/// The first `count` frames, or all.
+pub(crate) fn first(sequence: &Sequence, count: usize) -> Sequence {
+    sequence.slice(0..count.min(sequence.frames()))
+}
+
+/// One direction and distance for all shapes of a figure.
+#[derive(Clone)]
+pub(crate) struct View {
+    camera: Camera,
+    topology: Arc<Topology>,
+}
+
+impl View {
+    fn of(sequence: &Sequence, [yaw, pitch]: [f64; 2]) -> Self {
+        let mut camera = Camera {
+            yaw,
+            pitch,
+            ..Camera::default()
+        };
+        camera.frame(&Bounds::of(sequence.positions()), 1.0);
+        View {
+            camera,
+            topology: sequence.topology().clone(),
+        }
+    }
+
+    /// A shape (3V coordinates) on a clear background, `side` x `side` pixels of colour `front`.
+    pub(crate) fn picture(&self, positions: &[f32], side: usize, front: [u8; 3]) -> Arc<Image> {
+        let mut image = Image::new(2 * side, 2 * side);
+        let surface = Surface {
+            triangles: self.topology.triangles(),
+            positions,
+            colours: None,
+        };
+        let style = Style {
+            background: [255, 255, 255, 0],
+            front,
+            ..Style::LIGHT
+        };
+        view::render(surface, &self.camera, &style, &mut image);
+        Arc::new(image.halved())
+    }
+}
+
+/// Prints columns under their heads, the first to the left, the others to the right.
+pub(crate) fn table(heads: &[&str], rows: &[Vec<String>]) {
+    let width = |column: usize| {
+        let cells = rows
+            .iter()
+            .filter_map(|row| row.get(column))
+            .map(|cell| cell.chars().count());
+        cells
+            .chain([heads[column].chars().count()])
+            .max()
+            .unwrap_or(0)
+    };
+    let print = |cells: &[String]| {
+        for (column, cell) in cells.iter().enumerate() {
+            let wide = width(column);
+            match column {
+                0 => print!("{cell:<wide$}"),
+                _ => print!("  {cell:>wide$}"),
+            }
+        }
+        println!();
+    };
+    print(&heads.iter().map(ToString::to_string).collect::<Vec<_>>());
+    rows.iter().for_each(|row| print(row));
+}
+
+/// A share as percent with digits that say something.
+pub(crate) fn percent(share: f64) -> String {
+    format!("{:.2} %", 100.0 * share)
+}
+
+/// Distance of two points of the map.
+pub(crate) fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+/// Largest distance of two of the points: the size of a map.
+pub(crate) fn diameter(points: &[[f64; 2]]) -> f64 {
+    let pairs = points
+        .iter()
+        .flat_map(|a| points.iter().map(move |b| distance(*a, *b)));
+    pairs.fold(0.0, f64::max)
+}
+
+/// Pictures in a row, left to right from `at`, each `side` wide with a line of text below.
+pub(crate) fn row(
+    scene: &mut Scene,
+    at: Point,
+    side: f32,
+    pictures: &[(String, Arc<Image>)],
+    theme: &Theme,
+) {
+    for (i, (text, image)) in pictures.iter().enumerate() {
+        let left = at[0] + i as f32 * side;
+        scene.items.push(Item::Picture {
+            rect: Rect::new(left, at[1], side, side),
+            image: image.clone(),
+        });
+        let below = [left + 0.5 * side, at[1] + side + 0.9 * theme.text];
+        scene.write(text, below, meshloom::plot::Anchor::Middle, theme);
+    }
+}
+
+/// A frame around a part of the picture.
+pub(crate) fn outline(scene: &mut Scene, rect: Rect, theme: &Theme) {
+    scene.stroke(Path::rect(rect), Stroke::new(theme.muted, theme.unit()));
+}
