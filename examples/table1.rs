@@ -11,7 +11,8 @@ use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
 use meshloom::diag::Result;
-use meshloom::loom::fit::{FitOptions, fit_rows};
+use meshloom::loom::fit::FitOptions;
+use meshloom::loom::fitted::fit_rows;
 use meshloom::math::pca::Rows;
 use meshloom::mesh::FrameSource;
 use meshloom::plot::{Chart, Panel, Scale, Series, Style, Theme, Tick, Tint, chart};

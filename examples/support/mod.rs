@@ -14,11 +14,13 @@ use meshloom::demo::Demo;
 use meshloom::diag::{Diagnostic, Result};
 use meshloom::image::Image;
 use meshloom::io::Disk;
-use meshloom::mesh::{FrameSource, Sequence, Topology};
+use meshloom::loom::Loom;
+use meshloom::loom::fit::{self, FitOptions};
+use meshloom::mesh::{Bounds, FrameSource, Sequence, Topology};
 use meshloom::pipeline::{self, Content, InputSpec, PictureFormat};
 use meshloom::plot::{Item, Path, Point, Rect, Scene, Stroke, Theme};
 use meshloom::task::Task;
-use meshloom::view::{self, Bounds, Camera, Style, Surface};
+use meshloom::view::{self, Camera, Style, Surface};
 
 /// A figure under way.
 pub(crate) struct Figure {
@@ -100,6 +102,27 @@ impl Figure {
     }
 }
 
+/// Fits `sequence` with given k, l, m.
+pub(crate) fn fit(sequence: &Sequence, [controls, sites, modes]: [usize; 3]) -> Result<Loom> {
+    fit_with(sequence, [controls, sites, modes], FitOptions::default())
+}
+
+/// Fits with given k, l, m and other options.
+pub(crate) fn fit_with(
+    sequence: &Sequence,
+    [controls, sites, modes]: [usize; 3],
+    options: FitOptions,
+) -> Result<Loom> {
+    let options = FitOptions {
+        controls: Some(controls),
+        sites: Some(sites),
+        modes: Some(modes),
+        left_out: false,
+        ..options
+    };
+    Ok(fit::fit(sequence, &options, &Task::default())?.output)
+}
+
 /// Every `step`-th frame, from the first on.
 pub(crate) fn every(sequence: &Sequence, step: usize) -> Sequence {
     let kept = (0..sequence.frames()).step_by(step);
@@ -127,7 +150,9 @@ impl View {
             pitch,
             ..Camera::default()
         };
-        camera.frame(&Bounds::of(sequence.positions()), 1.0);
+        if let Some(bounds) = Bounds::of(sequence.positions()) {
+            camera.frame(&bounds, 1.0);
+        }
         View {
             camera,
             topology: sequence.topology().clone(),
