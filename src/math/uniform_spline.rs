@@ -144,9 +144,14 @@ impl UniformFitter {
             self.design
                 .add_transposed(0, &column, controls.col_as_slice_mut(c));
         }
+        self.solve(controls)
+    }
+
+    /// (A^T A)^-1 `right` for any right sides, k x c.
+    pub fn solve(&self, right: Mat<f64>) -> Mat<f64> {
         match &self.factor {
-            Some(factor) => factor.solve(controls),
-            None => controls,
+            Some(factor) => factor.solve(right),
+            None => right,
         }
     }
 }

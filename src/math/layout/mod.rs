@@ -312,7 +312,7 @@ fn centre<'a>(points: impl ExactSizeIterator<Item = &'a Point>) -> Point {
 }
 
 /// `start` moved rigidly so that its pinned positions lie nearest to the pins.
-fn turned_to(pins: &[(usize, Point)], start: &[Point]) -> Vec<Point> {
+pub fn turned_to(pins: &[(usize, Point)], start: &[Point]) -> Vec<Point> {
     let from: Vec<Point> = pins.iter().map(|&(frame, _)| start[frame]).collect();
     let to: Vec<Point> = pins.iter().map(|&(_, pin)| pin).collect();
     let (a, b) = (centre(from.iter()), centre(to.iter()));

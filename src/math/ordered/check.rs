@@ -1,36 +1,53 @@
 //! Whether a fit is right between its samples, too.
 
-use super::samples::{Curve, Samples};
-use crate::math::variable_projection::Refined;
+use faer::Mat;
 
-/// Deviations of g(f(t)) from the motion, relative to the motion's spread.
+use super::samples::Samples;
+
+/// Deviations of more than this part of a frame step are seen as pops.
+const VISIBLE: f64 = 0.05;
+/// A fit that is so many times worse between its samples than at them has a spike there.
+const SPIKE: f64 = 1.6;
+/// What is below these parts of what the modes leave out, or of linear interpolation's error, is lost
+/// in them.
+const OF_FLOOR: f64 = 0.4;
+const OF_LINEAR: f64 = 0.2;
+
+/// Deviations of g(f(t)) from the motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quality {
-    /// Root mean square at the fitted samples.
+    /// Root mean square at the fitted samples, relative to the motion's spread.
     pub at_samples: f64,
-    /// Root mean square at twice as many samples.
+    /// The same at twice as many samples.
     pub between: f64,
+    /// The largest of those, in root mean square steps between frames.
+    pub worst: f64,
     /// Whether it is worse between the samples than at them: a saddle has survived.
     pub spiked: bool,
-    /// Neither spiked nor worse than what the number of modes leaves out, or than a fifth of what
-    /// linear interpolation is off.
+    /// Not spiked, nowhere visible, and lost in what the modes leave out or linear interpolation is off.
     pub good: bool,
 }
 
 impl Quality {
-    pub(super) fn of(samples: &Samples, curve: &Curve, fit: &Refined, floor: f64) -> Self {
-        let controls = fit.controls.as_ref();
-        let at = fit.plate.at(curve.fitted.design().apply(controls).as_ref());
-        let between = fit.plate.at(curve.finer.apply(controls).as_ref());
-        let at_samples = (&samples.dense - at).norm_l2() * 2f64.sqrt() / samples.spread;
-        let between = (&samples.finer - between).norm_l2() / samples.spread;
-        let linear = samples.linear / samples.spread;
-        let spiked = between > (1.6 * at_samples).max(0.2 * linear);
+    /// Of what a fit gives at the fitted and at the check samples.
+    pub(super) fn of(samples: &Samples, at: &Mat<f64>, between: &Mat<f64>, floor: f64) -> Self {
+        let largest = |missed: &Mat<f64>| {
+            let rows = (0..missed.nrows()).map(|row| missed.row(row).norm_l2());
+            rows.fold(0.0, f64::max) / samples.step
+        };
+        let missed = (&samples.dense - at, &samples.finer - between);
+        let at_samples = missed.0.norm_l2() * 2f64.sqrt() / samples.spread;
+        let between = missed.1.norm_l2() / samples.spread;
+        let (worst_at, worst) = (largest(&missed.0), largest(&missed.1));
+        let linear = OF_LINEAR * samples.linear / samples.spread;
+        let spiked = between > (SPIKE * at_samples).max(linear)
+            || worst > VISIBLE && worst > 2.0 * SPIKE * worst_at;
         Quality {
             at_samples,
             between,
+            worst,
             spiked,
-            good: !spiked && between <= (0.4 * floor).max(0.2 * linear),
+            good: !spiked && worst <= VISIBLE && between <= linear.max(OF_FLOOR * floor),
         }
     }
 }

@@ -4,15 +4,16 @@
 //! D0 are the distances of the samples, G those along the order graph with reach tau times their root
 //! mean square. A layout minimises the stress of D = D0^(1-theta) G^theta with weights
 //! 1/(D + eps max D)^2. Whether it is *accepted* depends on how well a curve and a plate of fixed
-//! fidelity (k = .8n, l = .6n) over it meet the motion at samples that were not fitted.
+//! fidelity (k = .8n, l = .6n) over it meet the motion at samples that were not fitted; nothing here
+//! depends on the fidelity that is asked for, so that the choice does not change with it.
 
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
 
-use super::samples::{Curve, Samples, mean};
-use super::unrefined;
+use super::refine::unrefined;
+use super::samples::{Curve, Samples, mean, rows};
 use crate::math::b_spline::Point;
-use crate::math::layout::{Distances, Stop, majorise};
+use crate::math::layout::{Distances, Stop, majorise, to_principal_axes, turned_to};
 use crate::math::order_graph::geodesics;
 use crate::math::symmetric;
 use crate::task::{Cancelled, Task};
@@ -21,13 +22,15 @@ use crate::task::{Cancelled, Task};
 const REACHES: [f64; 7] = [0.2, 0.14, 0.1, 0.07, 0.05, 0.025, 0.0];
 /// The walk from geodesic (1) to plain distances (0).
 const WALK: [f64; 7] = [0.8, 0.6, 0.45, 0.3, 0.2, 0.1, 0.0];
-/// A layout is accepted up to so many times the best score found.
-const WORSE: f64 = 2.0;
+/// A layout is accepted up to so many times the best score found,
+const WORSE: f64 = 1.5;
 /// .. or up to so many times what the modes leave out.
-const FLOORS: f64 = 1.5;
+const FLOORS: f64 = 0.75;
+/// So many candidates are worth refining.
+const CANDIDATES: usize = 4;
 /// Softening of the weights, of the largest distance.
 const SOFTENING: f64 = 0.02;
-/// The stress need not be exact: what follows moves the curve anyway.
+/// The stress need not be exact: refinement moves the curve anyway.
 const STOP: Stop = Stop {
     change: 1e-5,
     steps: 60,
@@ -44,20 +47,180 @@ pub struct Choice {
     pub theta: f64,
 }
 
-/// A layout that may be refined, at the layout's samples.
+/// A layout at the layout's samples, along its principal axes, of root mean square radius 1.
 #[derive(Debug, Clone)]
 pub(super) struct Candidate {
     pub(super) choice: Choice,
     pub(super) layout: Mat<f64>,
+    /// Its radius before it was made 1, in units of the motion.
+    natural: f64,
     /// Deviation at the check samples, as a norm.
-    pub(super) score: f64,
+    score: f64,
 }
 
-/// All that was laid out.
-pub(super) struct Layouts {
-    unrolled: Vec<Candidate>,
-    accepted: usize,
-    walk: Vec<Candidate>,
+/// The distances that layouts are made from.
+pub(super) struct Order {
+    plain: Distances,
+    /// Their root mean square.
+    radius: f64,
+}
+
+impl Order {
+    pub(super) fn new(samples: &Samples) -> Self {
+        let laid_out = samples.laid_out.as_ref();
+        let plain = Distances::between(&rows(laid_out), laid_out.ncols());
+        Order {
+            radius: root_mean_square(&plain),
+            plain,
+        }
+    }
+
+    /// D of a choice.
+    fn targets(&self, choice: Choice) -> Distances {
+        blend(
+            &self.plain,
+            &self.graph(choice.tau),
+            choice.theta,
+            1e-9 * self.radius,
+        )
+    }
+
+    fn graph(&self, tau: f64) -> Distances {
+        geodesics(&self.plain, tau * self.radius)
+    }
+
+    /// How many pairs a reach joins.
+    fn joined(&self, tau: f64) -> usize {
+        let reach = tau * self.radius;
+        self.plain.values().iter().filter(|&&d| d < reach).count()
+    }
+
+    /// A candidate with its samples `pins` where they belong: none as it is, one translated, more held
+    /// while the others follow. Without a score of its own.
+    pub(super) fn pinned(
+        &self,
+        candidate: &Candidate,
+        pins: &[(usize, Point)],
+        stop: &Stop,
+        task: &Task,
+    ) -> Result<Candidate, Cancelled> {
+        let points = points(candidate.layout.as_ref());
+        let moved = match pins {
+            [] => points,
+            [one] => translated(&points, *one),
+            _ => {
+                let targets = self.targets(candidate.choice);
+                let scale = 1.0 / candidate.natural;
+                let mut values = targets.values().iter();
+                let targets = Distances::from_fn(targets.count(), |_, _| {
+                    scale * values.next().unwrap_or(&0.0)
+                });
+                least_stress(&targets, &turned_to(pins, &points), pins, stop, task)?
+            }
+        };
+        Ok(Candidate {
+            layout: Mat::from_fn(moved.len(), 2, |i, a| moved[i][a]),
+            ..candidate.clone()
+        })
+    }
+}
+
+impl Candidate {
+    /// A layout made elsewhere, of radius 1 when it was unpinned, then `natural` large.
+    pub(super) fn known(choice: Choice, layout: Mat<f64>, natural: f64) -> Self {
+        Candidate {
+            choice,
+            layout,
+            natural,
+            score: f64::INFINITY,
+        }
+    }
+
+    /// Its radius in units of the motion.
+    pub(super) fn natural(&self) -> f64 {
+        self.natural
+    }
+}
+
+/// Lays the motion out unrolled for each reach, walks from the largest accepted one, and returns what
+/// is worth refining in the order in which it should be tried: the end of the walk, its start, then the
+/// unrolled ones of the least scores. Never empty.
+pub(super) fn candidates(
+    order: &Order,
+    samples: &Samples,
+    floor: f64,
+    task: &Task,
+) -> Result<Vec<Candidate>, Cancelled> {
+    let scale = Scale {
+        samples,
+        curve: samples.curve(samples.usual_controls()),
+        sites: samples.usual_sites(),
+    };
+    let mut unrolled = unrolled(order, &scale, task)?;
+    let tolerated = FLOORS * floor * samples.spread;
+    let least = unrolled
+        .iter()
+        .map(|one| one.score)
+        .fold(f64::INFINITY, f64::min);
+    let accepts = |score: f64, least: f64| score <= (WORSE * least).max(tolerated);
+    let first = unrolled
+        .iter()
+        .position(|one| accepts(one.score, least))
+        .unwrap_or(0);
+    let mut worth = walk(order, &scale, &unrolled[first], least, &accepts, task)?;
+    worth.reverse();
+    if worth.len() > 1 {
+        worth.drain(1..worth.len() - 1);
+    }
+    unrolled.remove(first);
+    unrolled.sort_by(|a, b| a.score.total_cmp(&b.score));
+    worth.extend(unrolled);
+    worth.truncate(CANDIDATES);
+    Ok(worth)
+}
+
+/// theta = 1 for every reach that joins other pairs than the one before.
+fn unrolled(order: &Order, scale: &Scale<'_>, task: &Task) -> Result<Vec<Candidate>, Cancelled> {
+    let mut reaches = REACHES.to_vec();
+    reaches.dedup_by_key(|tau| order.joined(*tau));
+    reaches
+        .par_iter()
+        .map(|&tau| {
+            task.check()?;
+            let graph = order.graph(tau);
+            let start = classical(&graph);
+            let candidate = scale.candidate(Choice { tau, theta: 1.0 }, &graph, &start, task)?;
+            task.step();
+            Ok(candidate)
+        })
+        .collect()
+}
+
+/// From `first` towards plain distances, as far as it is accepted; `first` included.
+fn walk(
+    order: &Order,
+    scale: &Scale<'_>,
+    first: &Candidate,
+    mut least: f64,
+    accepts: &dyn Fn(f64, f64) -> bool,
+    task: &Task,
+) -> Result<Vec<Candidate>, Cancelled> {
+    let tau = first.choice.tau;
+    let graph = order.graph(tau);
+    let mut walk = vec![first.clone()];
+    for theta in WALK {
+        task.check()?;
+        let targets = blend(&order.plain, &graph, theta, 1e-9 * order.radius);
+        let start = points(walk[walk.len() - 1].layout.as_ref());
+        let next = scale.candidate(Choice { tau, theta }, &targets, &start, task)?;
+        task.step();
+        least = least.min(next.score);
+        if !accepts(next.score, least) {
+            break;
+        }
+        walk.push(next);
+    }
+    Ok(walk)
 }
 
 /// What scores a layout.
@@ -68,101 +231,58 @@ struct Scale<'a> {
 }
 
 impl Scale<'_> {
-    fn score(&self, layout: MatRef<'_, f64>) -> f64 {
-        let points = self.samples.dense_layout(layout);
-        let (controls, plate) = unrefined(self.samples, &self.curve, points.as_ref(), self.sites);
-        let between = plate.at(self.curve.finer.apply(controls.as_ref()).as_ref());
-        (&self.samples.finer - between).norm_l2()
-    }
-}
-
-impl Layouts {
-    /// Lays out the motion unrolled for each reach, takes the largest accepted one and walks.
-    pub(super) fn find(
-        frames: MatRef<'_, f64>,
-        samples: &Samples,
-        floor: f64,
+    /// The layout of least stress near `start`, scored.
+    fn candidate(
+        &self,
+        choice: Choice,
+        targets: &Distances,
+        start: &[Point],
         task: &Task,
-    ) -> Result<Self, Cancelled> {
-        let count = frames.nrows();
-        let budget = |share: f64| ((share * count as f64) as usize).max(4);
-        let scale = Scale {
-            samples,
-            curve: samples.curve(budget(0.8)),
-            sites: budget(0.6),
+    ) -> Result<Candidate, Cancelled> {
+        let size = radius(start);
+        // The mean squared distance is twice the squared radius.
+        let scale = match size > 0.0 {
+            true => root_mean_square(targets) / (2f64.sqrt() * size),
+            false => 1.0,
         };
-        let rows: Vec<f64> = samples
-            .laid_out
-            .row_iter()
-            .flat_map(|row| row.iter().copied().collect::<Vec<_>>())
-            .collect();
-        let plain = Distances::between(&rows, samples.laid_out.ncols());
-        let radius = root_mean_square(&plain);
-        let tolerated = FLOORS * floor * samples.spread;
-        let started: Vec<(Candidate, Distances)> = REACHES
-            .par_iter()
-            .map(|&tau| {
-                task.check()?;
-                let graph = geodesics(&plain, tau * radius);
-                let layout = stressed(&graph, classical(&graph), task)?;
-                task.step();
-                Ok((scale.candidate(tau, 1.0, layout), graph))
-            })
-            .collect::<Result<_, _>>()?;
-        let mut least = started
-            .iter()
-            .map(|(one, _)| one.score)
-            .fold(f64::INFINITY, f64::min);
-        let limit = |least: f64| (WORSE * least).max(tolerated);
-        let accepted = started
-            .iter()
-            .position(|(one, _)| one.score <= limit(least))
-            .unwrap_or(started.len() - 1);
-        let graph = &started[accepted].1;
-        let mut walk = vec![started[accepted].0.clone()];
-        for theta in WALK {
-            task.check()?;
-            let targets = blend(&plain, graph, theta, 1e-9 * radius);
-            let layout = stressed(&targets, walk[walk.len() - 1].layout.clone(), task)?;
-            let next = scale.candidate(walk[0].choice.tau, theta, layout);
-            task.step();
-            least = least.min(next.score);
-            if next.score > limit(least) {
-                break;
-            }
-            walk.push(next);
-        }
-        Ok(Layouts {
-            unrolled: started.into_iter().map(|(one, _)| one).collect(),
-            accepted,
-            walk,
+        let start: Vec<Point> = start.iter().map(|p| p.map(|x| scale * x)).collect();
+        let mut found = least_stress(targets, &start, &[], &STOP, task)?;
+        to_principal_axes(&mut found);
+        let natural = Some(radius(&found))
+            .filter(|&size| size > 0.0)
+            .unwrap_or(1.0);
+        let layout = Mat::from_fn(found.len(), 2, |i, a| found[i][a] / natural);
+        let between = unrefined(self.samples, &self.curve, layout.as_ref(), self.sites);
+        Ok(Candidate {
+            choice,
+            layout,
+            natural,
+            score: (&self.samples.finer - between).norm_l2(),
         })
     }
-
-    /// In the order in which they should be tried: the end of the walk, its start, then unrolled ones
-    /// of shorter reach (the next, one in the middle, none at all).
-    pub(super) fn candidates(&self) -> Vec<&Candidate> {
-        let last = self.unrolled.len() - 1;
-        let mut order: Vec<&Candidate> = self.walk.last().into_iter().collect();
-        if self.walk.len() > 1 {
-            order.push(&self.walk[0]);
-        }
-        let next = self.accepted + 1;
-        let mut reserves = vec![next, (next + last).div_ceil(2), last];
-        reserves.retain(|&i| next <= i && i <= last);
-        reserves.dedup();
-        order.extend(reserves.into_iter().map(|i| &self.unrolled[i]));
-        order
-    }
 }
 
-impl Scale<'_> {
-    fn candidate(&self, tau: f64, theta: f64, layout: Mat<f64>) -> Candidate {
-        Candidate {
-            choice: Choice { tau, theta },
-            score: self.score(layout.as_ref()),
-            layout,
-        }
+/// Positions of least relative stress near `start`, the pins held.
+fn least_stress(
+    targets: &Distances,
+    start: &[Point],
+    pins: &[(usize, Point)],
+    stop: &Stop,
+    task: &Task,
+) -> Result<Vec<Point>, Cancelled> {
+    task.check()?;
+    let largest = targets
+        .values()
+        .iter()
+        .copied()
+        .fold(f64::MIN_POSITIVE, f64::max);
+    // In units of the largest distance, so that no square leaves the range of numbers.
+    let weight = |target: &f64| 1.0 / (target / largest + SOFTENING).powi(2);
+    let weights: Vec<f64> = targets.values().iter().map(weight).collect();
+    match majorise(targets, Some(&weights), start, pins, stop, task) {
+        Ok(layout) => Ok(layout.positions),
+        // All weights are positive: only cancelling stops it.
+        Err(_) => task.check().map(|()| start.to_vec()),
     }
 }
 
@@ -175,41 +295,8 @@ fn blend(plain: &Distances, graph: &Distances, theta: f64, least: f64) -> Distan
     })
 }
 
-/// The layout of least relative stress near `start`, centred, of root mean square radius 1.
-fn stressed(targets: &Distances, mut start: Mat<f64>, task: &Task) -> Result<Mat<f64>, Cancelled> {
-    let radius = start.norm_l2() / (start.nrows() as f64).sqrt();
-    if radius > 0.0 {
-        // Mean squared distance is twice the squared radius.
-        start *= faer::Scale(root_mean_square(targets) / (2f64.sqrt() * radius));
-    }
-    let largest = targets.values().iter().copied().fold(0.0, f64::max);
-    let soft = SOFTENING * largest.max(f64::MIN_POSITIVE);
-    // In units of the largest distance, so that no square leaves the range of numbers.
-    let weight = |target: &f64| 1.0 / ((target + soft) / largest).powi(2);
-    let weights: Vec<f64> = targets.values().iter().map(weight).collect();
-    let points: Vec<Point> = (0..start.nrows())
-        .map(|i| [start[(i, 0)], start[(i, 1)]])
-        .collect();
-    task.check()?;
-    match majorise(targets, Some(&weights), &points, &[], &STOP, task) {
-        Ok(layout) => Ok(normalised(Mat::from_fn(start.nrows(), 2, |i, a| {
-            layout.positions[i][a]
-        }))),
-        Err(_) => {
-            task.check()?;
-            Ok(normalised(start))
-        }
-    }
-}
-
-/// Root mean square over all ordered pairs, each with itself included.
-fn root_mean_square(distances: &Distances) -> f64 {
-    let squares: f64 = distances.values().iter().map(|d| d * d).sum();
-    (2.0 * squares).sqrt() / distances.count().max(1) as f64
-}
-
 /// Classical scaling: the two leading principal coordinates of `targets`, slightly shaken.
-fn classical(targets: &Distances) -> Mat<f64> {
+fn classical(targets: &Distances) -> Vec<Point> {
     let count = targets.count();
     let squares = Mat::from_fn(count, count, |i, j| targets.get(i, j).powi(2));
     let means = mean(squares.as_ref());
@@ -218,20 +305,46 @@ fn classical(targets: &Distances) -> Mat<f64> {
         -0.5 * (squares[(i, j)] - means[i] - means[j] + total)
     });
     let Some((values, vectors)) = symmetric::eigen(gram.as_ref()) else {
-        return Mat::from_fn(count, 2, |i, a| if a == 0 { i as f64 } else { 0.0 });
+        return (0..count).map(|i| [i as f64, 0.0]).collect();
     };
-    let mut points = Mat::from_fn(count, 2, |i, a| {
-        vectors[(i, a.min(count - 1))] * values[a.min(count - 1)].max(0.0).sqrt()
-    });
-    let noise = NOISE * points.norm_l2() / (2.0 * count as f64).sqrt();
+    let coordinate = |i: usize, a: usize| vectors[(i, a)] * values[a].max(0.0).sqrt();
+    let points: Vec<Point> = (0..count)
+        .map(|i| [coordinate(i, 0), coordinate(i, 1)])
+        .collect();
+    let noise = NOISE * radius(&points);
     let mut random = seeded();
-    for a in 0..2 {
-        points
-            .col_as_slice_mut(a)
-            .iter_mut()
-            .for_each(|x| *x += noise * random());
-    }
     points
+        .iter()
+        .map(|p| p.map(|x| x + noise * random()))
+        .collect()
+}
+
+/// Root mean square over all ordered pairs, each with itself included.
+fn root_mean_square(distances: &Distances) -> f64 {
+    let squares: f64 = distances.values().iter().map(|d| d * d).sum();
+    (2.0 * squares).sqrt() / distances.count().max(1) as f64
+}
+
+/// Root mean square distance from the origin.
+fn radius(points: &[Point]) -> f64 {
+    let squares: f64 = points.iter().map(|[x, y]| x * x + y * y).sum();
+    (squares / points.len().max(1) as f64).sqrt()
+}
+
+fn points(layout: MatRef<'_, f64>) -> Vec<Point> {
+    (0..layout.nrows())
+        .map(|i| [layout[(i, 0)], layout[(i, 1)]])
+        .collect()
+}
+
+/// All points moved so that one lies where it should.
+fn translated(points: &[Point], (pinned, to): (usize, Point)) -> Vec<Point> {
+    let from = points[pinned];
+    let shift = [to[0] - from[0], to[1] - from[1]];
+    points
+        .iter()
+        .map(|p| [p[0] + shift[0], p[1] + shift[1]])
+        .collect()
 }
 
 /// Numbers in \[-1, 1\], always the same ones (xorshift).
@@ -243,19 +356,4 @@ fn seeded() -> impl FnMut() -> f64 {
         state ^= state << 17;
         (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
     }
-}
-
-fn normalised(mut points: Mat<f64>) -> Mat<f64> {
-    let mean = mean(points.as_ref());
-    for (a, mean) in mean.iter().enumerate() {
-        points
-            .col_as_slice_mut(a)
-            .iter_mut()
-            .for_each(|x| *x -= mean);
-    }
-    let radius = points.norm_l2() / (points.nrows() as f64).sqrt();
-    if radius > 0.0 {
-        points *= faer::Scale(1.0 / radius);
-    }
-    points
 }

@@ -1,11 +1,15 @@
 //! Where the motion is looked at: frames, samples that are fitted, samples that check the fit.
 
-use faer::{Mat, MatRef};
+use faer::prelude::Solve;
+use faer::{Mat, MatRef, Side};
 
+use crate::math::b_spline::Point;
 use crate::math::cubic_spline::{CubicSpline, Ends};
 use crate::math::uniform_spline::{UniformDesign, UniformFitter};
 
-/// Up to so many samples the layout itself is made on the fitted samples, not on the frames.
+/// Motions shorter than this are sampled twice as densely.
+const SHORT: usize = 64;
+/// Up to so many frames the layout itself is made on the fitted samples, not on the frames.
 const DENSE_LAYOUT: usize = 120;
 
 /// Times and the motion at them.
@@ -19,11 +23,13 @@ pub(super) struct Samples {
     /// Twice as many to check with.
     pub(super) finer: Mat<f64>,
     /// Samples an interval of the layout: 1 or `rate`.
-    pub(super) layout_rate: usize,
+    layout_rate: usize,
     /// The motion at the layout's samples.
     pub(super) laid_out: Mat<f64>,
     /// Norm of the check samples about their mean.
     pub(super) spread: f64,
+    /// Root mean square distance between consecutive frames.
+    pub(super) step: f64,
     /// Norm of linear interpolation's error at the check samples.
     pub(super) linear: f64,
 }
@@ -38,28 +44,33 @@ pub(super) struct Curve {
 }
 
 impl Samples {
+    /// `frames`, n x m, n >= 2.
     pub(super) fn new(frames: MatRef<'_, f64>) -> Self {
+        Samples::at_rate(frames, if frames.nrows() < SHORT { 4 } else { 2 })
+    }
+
+    /// The same with `rate` fitted samples an interval.
+    pub(super) fn at_rate(frames: MatRef<'_, f64>, rate: usize) -> Self {
         let count = frames.nrows();
-        let rate = if count < 64 { 4 } else { 2 };
         let layout_rate = if count > DENSE_LAYOUT { 1 } else { rate };
-        let finer_times = times(count, 2 * rate);
-        let finer = through(frames, &finer_times);
-        let chord = Mat::from_fn(finer.nrows(), finer.ncols(), |row, c| {
-            let time = finer_times[row];
-            let i = (time as usize).min(count - 2);
-            let x = time - i as f64;
+        let finer = through(frames, &times(count, 2 * rate));
+        let chords = Mat::from_fn(finer.nrows(), finer.ncols(), |row, c| {
+            let i = (row / (2 * rate)).min(count - 2);
+            let x = row as f64 / (2 * rate) as f64 - i as f64;
             (1.0 - x) * frames[(i, c)] + x * frames[(i + 1, c)]
         });
         let mean = mean(finer.as_ref());
-        let spread = Mat::from_fn(finer.nrows(), finer.ncols(), |i, c| finer[(i, c)] - mean[c]);
+        let moved = Mat::from_fn(finer.nrows(), finer.ncols(), |i, c| finer[(i, c)] - mean[c]);
+        let steps = (1..count).map(|i| (frames.row(i) - frames.row(i - 1)).squared_norm_l2());
         Samples {
             frames: count,
             rate,
             dense: through(frames, &times(count, rate)),
             layout_rate,
             laid_out: through(frames, &times(count, layout_rate)),
-            spread: spread.norm_l2(),
-            linear: (&finer - chord).norm_l2(),
+            spread: moved.norm_l2(),
+            step: (steps.sum::<f64>() / (count - 1) as f64).sqrt(),
+            linear: (&finer - chords).norm_l2(),
             finer,
         }
     }
@@ -77,6 +88,30 @@ impl Samples {
         Mat::from_fn(self.frames, 2, |i, a| layout[(i * self.layout_rate, a)])
     }
 
+    /// A layout of the frames at the layout's samples.
+    pub(super) fn layout_of(&self, frames: MatRef<'_, f64>) -> Mat<f64> {
+        match self.layout_rate {
+            1 => frames.to_owned(),
+            rate => through(frames, &times(self.frames, rate)),
+        }
+    }
+
+    /// Pins of frames as pins of the layout's samples.
+    pub(super) fn layout_pins(&self, pins: &[(usize, Point)]) -> Vec<(usize, Point)> {
+        let sample = |&(frame, at): &(usize, Point)| (frame * self.layout_rate, at);
+        pins.iter().map(sample).collect()
+    }
+
+    /// .8 n control points.
+    pub(super) fn usual_controls(&self) -> usize {
+        (self.frames * 4 / 5).max(4)
+    }
+
+    /// .6 n sites.
+    pub(super) fn usual_sites(&self) -> usize {
+        (self.frames * 3 / 5).max(4)
+    }
+
     /// Designs for `controls` control points.
     pub(super) fn curve(&self, controls: usize) -> Curve {
         let length = (self.frames - 1) as f64;
@@ -90,6 +125,11 @@ impl Samples {
 }
 
 impl Curve {
+    /// k.
+    pub(super) fn controls(&self) -> usize {
+        self.fitted.design().controls()
+    }
+
     /// The curve's points at `count` times evenly spread over its domain.
     pub(super) fn even_points(&self, controls: MatRef<'_, f64>, count: usize) -> Mat<f64> {
         let last = count.max(2) - 1;
@@ -98,6 +138,39 @@ impl Curve {
             .collect();
         UniformDesign::new(controls.nrows(), self.length, &times).apply(controls)
     }
+
+    /// The curve nearest to `points` at the fitted samples among those through the pins.
+    pub(super) fn fit(&self, points: MatRef<'_, f64>, pins: &[(usize, Point)]) -> Mat<f64> {
+        let controls = self.fitted.fit(points);
+        self.through_pins(controls, pins)
+    }
+
+    /// The curve through the pins that is nearest to that of `controls` at the fitted samples:
+    /// C + V J^T (J V J^T)^-1 (pins - J C), V = (A^T A)^-1.
+    pub(super) fn through_pins(&self, mut controls: Mat<f64>, pins: &[(usize, Point)]) -> Mat<f64> {
+        if pins.is_empty() {
+            return controls;
+        }
+        let rows = self.rows_at(pins);
+        let missed = Mat::from_fn(pins.len(), 2, |q, a| pins[q].1[a]) - &rows * &controls;
+        let spread = self.fitted.solve(rows.transpose().to_owned());
+        let mut gram = &rows * &spread;
+        let shift = 1e-13 * gram.norm_max();
+        for q in 0..pins.len() {
+            gram[(q, q)] += shift;
+        }
+        if let Ok(factor) = gram.llt(Side::Lower) {
+            controls += spread * factor.solve(missed);
+        }
+        controls
+    }
+
+    /// J: the curve's rows at pinned frames, q x k.
+    pub(super) fn rows_at(&self, pins: &[(usize, Point)]) -> Mat<f64> {
+        let times: Vec<f64> = pins.iter().map(|&(frame, _)| frame as f64).collect();
+        let design = UniformDesign::new(self.controls(), self.length, &times);
+        design.apply(Mat::identity(self.controls(), self.controls()).as_ref())
+    }
 }
 
 /// The C2 cubic spline without a knot at the first and last inner frame ("not a knot") through `frames`
@@ -105,11 +178,8 @@ impl Curve {
 pub(super) fn through(frames: MatRef<'_, f64>, times: &[f64]) -> Mat<f64> {
     let width = frames.ncols();
     let knots: Vec<f64> = (0..frames.nrows()).map(|i| i as f64).collect();
-    let values: Vec<f64> = (0..frames.nrows() * width)
-        .map(|at| frames[(at / width, at % width)])
-        .collect();
     let mut found = Mat::zeros(times.len(), width);
-    let Ok(spline) = CubicSpline::new(&knots, &values, width, Ends::NotAKnot) else {
+    let Ok(spline) = CubicSpline::new(&knots, &rows(frames), width, Ends::NotAKnot) else {
         return found;
     };
     let mut value = vec![0.0; width];
@@ -120,6 +190,14 @@ pub(super) fn through(frames: MatRef<'_, f64>, times: &[f64]) -> Mat<f64> {
         }
     }
     found
+}
+
+/// The entries of a matrix row after row.
+pub(super) fn rows(matrix: MatRef<'_, f64>) -> Vec<f64> {
+    let width = matrix.ncols();
+    (0..matrix.nrows() * width)
+        .map(|at| matrix[(at / width, at % width)])
+        .collect()
 }
 
 /// `rate` times an interval over \[0, n-1\], the frames included.

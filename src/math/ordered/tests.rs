@@ -21,14 +21,14 @@ fn options(frames: usize) -> Options {
     Options {
         controls: frames * 4 / 5,
         sites: frames * 3 / 5,
-        floor: 0.0,
+        pins: Vec::new(),
     }
 }
 
 #[test]
 fn the_motion_is_met_between_the_frames_too() {
     let frames = strides(40);
-    let fit = fit(frames.as_ref(), &options(40), &Task::default()).unwrap();
+    let fit = fit(frames.as_ref(), 0.0, &options(40), &Task::default()).unwrap();
     let times: Vec<f64> = (0..39 * 8 + 1).map(|i| f64::from(i) / 8.0).collect();
     let curve = UniformDesign::new(32, 39.0, &times).apply(fit.controls.as_ref());
     let error = through(frames.as_ref(), &times) - fit.plate.at(curve.as_ref());
@@ -51,7 +51,7 @@ fn the_same_numbers_on_one_thread_and_on_two() {
             .num_threads(threads)
             .build()
             .unwrap();
-        pool.install(|| fit(frames.as_ref(), &options(40), &Task::default()).unwrap())
+        pool.install(|| fit(frames.as_ref(), 0.0, &options(40), &Task::default()).unwrap())
     };
     let (one, two) = (run(1), run(2));
     assert_eq!(one.controls, two.controls);
@@ -61,10 +61,10 @@ fn the_same_numbers_on_one_thread_and_on_two() {
 #[test]
 fn size_and_place_of_the_motion_do_not_matter() {
     let frames = strides(30);
-    let reference = fit(frames.as_ref(), &options(30), &Task::default()).unwrap();
+    let reference = fit(frames.as_ref(), 0.0, &options(30), &Task::default()).unwrap();
     for scale in [1e-8, 1e8] {
         let scaled = Mat::from_fn(30, 5, |i, c| scale * (frames[(i, c)] + 3.0 * c as f64));
-        let fit = fit(scaled.as_ref(), &options(30), &Task::default()).unwrap();
+        let fit = fit(scaled.as_ref(), 0.0, &options(30), &Task::default()).unwrap();
         assert_eq!(fit.choice, reference.choice);
         // Rounding, amplified by some twenty damped steps.
         let apart = fit.quality.between - reference.quality.between;
@@ -76,5 +76,5 @@ fn size_and_place_of_the_motion_do_not_matter() {
 fn a_cancelled_fit_says_so() {
     let task = Task::default();
     task.cancel();
-    assert!(fit(strides(30).as_ref(), &options(30), &task).is_err());
+    assert!(fit(strides(30).as_ref(), 0.0, &options(30), &task).is_err());
 }

@@ -1,0 +1,188 @@
+//! Refinement of one layout: curve and sites together, in rounds that hold on ever less firmly.
+
+use faer::{Mat, MatRef};
+
+use super::check::Quality;
+use super::layout::Candidate;
+use super::samples::{Curve, Samples};
+use crate::math::b_spline::Point;
+use crate::math::variable_projection::{self, Options, Plate, Problem, Refined};
+use crate::task::{Cancelled, Task};
+
+/// How far the curve may stray from its layout before that costs [`STRAYING`] of the first residual,
+/// in radii of the layout.
+const STRAY: f64 = 0.1;
+const STRAYING: f64 = 0.05;
+/// What sites cost that stray by one radius each, of a round's first residual: without it some run
+/// tens of radii away and gain nothing.
+const SITE_STRAYING: f64 = 0.01;
+
+/// One round: how many evaluations, and what the curve's bending costs, of the round's first residual.
+/// Wiggles that buy nothing are smoothed away; later rounds must not be biased by it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Round {
+    evaluations: usize,
+    bending: f64,
+}
+
+/// From a layout.
+pub(super) const LOOSE: Round = Round {
+    evaluations: 15,
+    bending: 0.3,
+};
+/// To the end.
+pub(super) const FIRM: Round = Round {
+    evaluations: 25,
+    bending: 0.05,
+};
+/// While a pin is dragged.
+pub(super) const QUICK: Round = Round {
+    evaluations: 3,
+    bending: 0.05,
+};
+
+/// A curve and a plate on their way.
+#[derive(Debug, Clone)]
+pub(super) struct Draft {
+    /// C, k x 2.
+    pub(super) controls: Mat<f64>,
+    /// g.
+    pub(super) plate: Plate,
+    /// Where the curve is held, k x 2, and how firmly.
+    pub(super) anchor: Mat<f64>,
+    pub(super) hold: f64,
+    pub(super) evaluations: usize,
+    pub(super) converged: bool,
+}
+
+impl Draft {
+    /// The least-squares curve over a layout (through the pins), sites at even times on it, and the
+    /// plate of least squares over both.
+    pub(super) fn over(
+        samples: &Samples,
+        curve: &Curve,
+        sites: usize,
+        candidate: &Candidate,
+        pins: &[(usize, Point)],
+    ) -> Self {
+        let points = samples.dense_layout(candidate.layout.as_ref());
+        let controls = curve.fit(points.as_ref(), pins);
+        let sites = curve.even_points(controls.as_ref(), sites);
+        let mut draft = Draft::at(samples, curve, controls, &sites);
+        let rows = samples.dense.nrows() as f64;
+        draft.hold = STRAYING * draft.residual(samples, curve) / (rows * STRAY * STRAY);
+        draft
+    }
+
+    /// The plate of least squares over given controls and sites; the curve is not held.
+    pub(super) fn at(
+        samples: &Samples,
+        curve: &Curve,
+        controls: Mat<f64>,
+        sites: &Mat<f64>,
+    ) -> Self {
+        let positions = curve.fitted.design().apply(controls.as_ref());
+        let targets = samples.dense.as_ref();
+        Draft {
+            plate: variable_projection::fit_plate(positions.as_ref(), targets, sites.as_ref()),
+            anchor: controls.clone(),
+            controls,
+            hold: 0.0,
+            evaluations: 0,
+            converged: false,
+        }
+    }
+
+    /// Squared residual at the fitted samples.
+    fn residual(&self, samples: &Samples, curve: &Curve) -> f64 {
+        let positions = curve.fitted.design().apply(self.controls.as_ref());
+        (&samples.dense - self.plate.at(positions.as_ref())).squared_norm_l2()
+    }
+
+    /// One round further. The curve keeps passing through what it passes through at `pins`.
+    pub(super) fn refined(
+        self,
+        samples: &Samples,
+        curve: &Curve,
+        pins: &[(usize, Point)],
+        round: Round,
+        task: &Task,
+    ) -> Result<Self, Cancelled> {
+        let residual = self.residual(samples, curve);
+        let spline = curve.fitted.design();
+        let second = second_differences(spline.controls());
+        let bent = (&second * &self.controls).squared_norm_l2();
+        let price = if bent > 0.0 {
+            round.bending * residual / bent
+        } else {
+            0.0
+        };
+        let bending = second.transpose() * &second * faer::Scale(price);
+        let hold = spline.gram() * faer::Scale(self.hold);
+        let fixed = curve.rows_at(pins);
+        let problem = Problem {
+            spline,
+            targets: samples.dense.as_ref(),
+            anchor: self.anchor.as_ref(),
+            hold: hold.as_ref(),
+            bending: bending.as_ref(),
+            fixed: fixed.as_ref(),
+            site_hold: SITE_STRAYING * residual / self.plate.sites.nrows() as f64,
+        };
+        let options = Options {
+            evaluations: round.evaluations,
+            ..Options::default()
+        };
+        let (controls, sites) = (self.controls.as_ref(), self.plate.sites.as_ref());
+        let refined = variable_projection::refine(&problem, controls, sites, &options, task)?;
+        Ok(self.with(refined))
+    }
+
+    fn with(self, refined: Refined) -> Self {
+        Draft {
+            controls: refined.controls,
+            plate: refined.plate,
+            evaluations: self.evaluations + refined.evaluations,
+            converged: refined.converged,
+            ..self
+        }
+    }
+
+    /// How good it is at the samples and between them.
+    pub(super) fn quality(&self, samples: &Samples, curve: &Curve, floor: f64) -> Quality {
+        let at = |design: &crate::math::uniform_spline::UniformDesign| {
+            self.plate.at(design.apply(self.controls.as_ref()).as_ref())
+        };
+        Quality::of(
+            samples,
+            &at(curve.fitted.design()),
+            &at(&curve.finer),
+            floor,
+        )
+    }
+}
+
+/// D with (D C)_i = C_i - 2 C_(i+1) + C_(i+2), (k-2) x k.
+fn second_differences(controls: usize) -> Mat<f64> {
+    Mat::from_fn(controls - 2, controls, |i, j| match j.wrapping_sub(i) {
+        0 | 2 => 1.0,
+        1 => -2.0,
+        _ => 0.0,
+    })
+}
+
+/// The plate over a layout without refinement, at the check samples: what scores layouts.
+pub(super) fn unrefined(
+    samples: &Samples,
+    curve: &Curve,
+    layout: MatRef<'_, f64>,
+    sites: usize,
+) -> Mat<f64> {
+    let points = samples.dense_layout(layout);
+    let controls = curve.fitted.fit(points.as_ref());
+    let sites = curve.even_points(controls.as_ref(), sites);
+    let draft = Draft::at(samples, curve, controls, &sites);
+    draft
+        .plate
+        .at(curve.finer.apply(draft.controls.as_ref()).as_ref())
+}
