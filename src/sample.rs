@@ -139,6 +139,14 @@ impl Sampled {
     }
 }
 
+impl fmt::Debug for Sampled {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Sampled")
+            .field("sampling", &self.sampling)
+            .finish_non_exhaustive()
+    }
+}
+
 impl FrameSource for Sampled {
     fn topology(&self) -> &Arc<Topology> {
         self.loom.topology()

@@ -479,3 +479,132 @@ fn a_cache_by_name_that_is_something_else() {
         refused(cache(name, ""), &line, &[name, "0 bytes"]);
     }
 }
+
+fn objs(folder: &Path) {
+    good().write_objs(&folder.join("in"));
+}
+
+#[test]
+fn fidelity_out_of_bounds_names_the_bound() {
+    // 4 frames: 4 <= k <= 6, 3 <= l <= 4, 0 <= m <= 3.
+    for (option, parts) in [
+        ("-k 3", ["3", "4", "6"]),
+        ("-k 7", ["7", "4", "6"]),
+        ("-l 2", ["2", "3", "4"]),
+        ("-l 5", ["5", "3", "4"]),
+        ("-m 4", ["4", "0", "3"]),
+    ] {
+        refused(objs, &format!("fit in -o f.loom {option}"), &parts);
+    }
+    refused(objs, "fit in -o f.loom --alpha 1.5", &["alpha", "1.5"]);
+}
+
+#[test]
+fn a_pin_on_a_frame_that_does_not_exist() {
+    for frame in ["0", "5"] {
+        let line = format!("fit in -o f.loom --pin {frame}=0,0");
+        refused(objs, &line, &[&format!("frame {frame}"), "1 to 4"]);
+    }
+    refused(
+        objs,
+        "fit in -o f.loom --pin 2=0,0 --pin 2=1,1",
+        &["frame 2", "twice"],
+    );
+}
+
+#[test]
+fn a_loom_by_another_ending() {
+    refused(objs, "fit in -o f.obj", &["f.obj", ".loom"]);
+    refused(objs, "fit in -o f", &["f", ".loom"]);
+}
+
+/// A loom of the good sequence, `in.loom`, changed by `change`.
+fn loom(change: impl FnOnce(Vec<u8>) -> Vec<u8>) -> impl FnOnce(&Path) {
+    move |folder| {
+        objs(folder);
+        meshloom(folder, "fit in -o in.loom").done();
+        let bytes = fs::read(folder.join("in.loom")).unwrap();
+        fs::write(folder.join("in.loom"), change(bytes)).unwrap();
+    }
+}
+
+#[test]
+fn times_outside_of_a_loom() {
+    for times in ["0.5", "1,4.1", "1:5:1", "-1:2:1", "0:2:1"] {
+        let line = format!("sample in.loom -o out --times={times}");
+        refused(loom(|bytes| bytes), &line, &["outside [1, 4]"]);
+    }
+    refused(
+        loom(|bytes| bytes),
+        "sample in.loom -o out --range 2:5",
+        &["2:5", "4 frames"],
+    );
+    refused(
+        loom(|bytes| bytes),
+        "sample in.loom -o out --times 1:4:1e-12",
+        &["frames"],
+    );
+}
+
+#[test]
+fn seconds_without_a_rate() {
+    refused(
+        loom(|bytes| bytes),
+        "sample in.loom -o out --fps 30",
+        &["frames per second", "--fps"],
+    );
+}
+
+#[test]
+fn damaged_looms() {
+    for cut in [1, 1000] {
+        let shorter = move |bytes: Vec<u8>| bytes[..bytes.len() - cut].to_vec();
+        refused(
+            loom(shorter),
+            "sample in.loom -o out",
+            &["in.loom", "cut short"],
+        );
+    }
+    for keep in [0, 5, 8, 100] {
+        let shorter = move |bytes: Vec<u8>| bytes[..keep].to_vec();
+        refused(loom(shorter), "sample in.loom -o out", &["in.loom", "loom"]);
+    }
+    let claims = |mut bytes: Vec<u8>| {
+        bytes[..8].copy_from_slice(&2_000_000_000u64.to_le_bytes());
+        bytes.truncate(1024);
+        bytes
+    };
+    refused(loom(claims), "info in.loom", &["in.loom"]);
+    refused(
+        loom(|_| good().obj(0).into_bytes()),
+        "sample in.loom -o out",
+        &["in.loom"],
+    );
+    let not_finite = |mut bytes: Vec<u8>| {
+        let end = bytes.len();
+        // The last doubles come before the single-precision numbers and whole numbers; one of the first.
+        let header = u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize;
+        bytes[8 + header..8 + header + 8].copy_from_slice(&f64::NAN.to_le_bytes());
+        assert_eq!(bytes.len(), end);
+        bytes
+    };
+    refused(
+        loom(not_finite),
+        "sample in.loom -o out",
+        &["in.loom", "finite"],
+    );
+    refused(
+        |_| {},
+        "sample in.loom -o out",
+        &["in.loom", "no such file"],
+    );
+}
+
+#[test]
+fn a_loom_that_would_replace_its_input() {
+    refused(
+        loom(|bytes| bytes),
+        "fit in.loom -o in.loom",
+        &["in.loom", "input"],
+    );
+}

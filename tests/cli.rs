@@ -457,3 +457,193 @@ fn every_format_carries_the_same_frames() {
         assert_eq!(found["max"], 0.0, "{out}");
     }
 }
+
+#[test]
+fn fit_reports_what_compare_measures() {
+    let folder = tempdir().unwrap();
+    sheet(8, 20).write_objs(&folder.path().join("sheet"));
+    let fit = "fit sheet -o s.loom --method ch12 -k 12 -l 9 -m 5 --fps 24 --json";
+    let report = meshloom(folder.path(), fit).done().object();
+    let present = keys(&report);
+    for key in [
+        "frames",
+        "vertices",
+        "faces",
+        "space",
+        "dimension",
+        "controls",
+        "sites",
+        "modes",
+        "fps",
+        "error",
+        "left_out",
+        "stress",
+        "seconds",
+        "warnings",
+    ] {
+        assert!(present.contains(&key), "{key} in {present:?}");
+    }
+    assert_eq!(keys(&report["error"]), ["pose", "shape", "time", "total"]);
+    assert_eq!(keys(&report["left_out"]), ["cubic", "linear", "psi"]);
+    assert_eq!(
+        keys(&report["seconds"]),
+        ["encode", "layout", "load", "pose", "shape", "time", "total"]
+    );
+    let count = |key: &str| report[key].as_u64().unwrap();
+    assert_eq!(
+        [count("frames"), count("vertices"), count("dimension")],
+        [20, 64, 192]
+    );
+    assert_eq!(
+        [count("controls"), count("sites"), count("modes")],
+        [12, 9, 5]
+    );
+    assert_eq!(report["fps"], 24.0);
+
+    meshloom(
+        folder.path(),
+        "sample s.loom -o back/f_###.obj --times 1:20:1",
+    )
+    .done();
+    let found = meshloom(folder.path(), "compare sheet back --json")
+        .done()
+        .object();
+    let (kg, total) = (&found["kg_percent"], &report["error"]["total"]);
+    let (kg, total) = (kg.as_f64().unwrap() / 100.0, total.as_f64().unwrap());
+    assert!(total > 0.01, "the fit is not exact: {total}");
+    // Frames are rounded to f32 on their way through files: 6e-8 of the coordinates, which are up to
+    // 20 times the motion, against errors of some per cent of it.
+    assert!((kg / total - 1.0).abs() < 1e-4, "{kg} {total}");
+    let direct = meshloom(folder.path(), "compare sheet s.loom --json")
+        .done()
+        .object();
+    assert_eq!(direct, found, "a loom stands for its frames");
+}
+
+#[test]
+fn full_fidelity_reproduces_every_frame() {
+    let folder = tempdir().unwrap();
+    sheet(6, 12).write_objs(&folder.path().join("sheet"));
+    let fit = "fit sheet -o s.loom --method ch12 -k 14 -l 12 -m 11 --json";
+    let report = meshloom(folder.path(), fit).done().object();
+    assert!(report["error"]["total"].as_f64().unwrap() <= 1e-8);
+    let found = meshloom(folder.path(), "compare sheet s.loom --json")
+        .done()
+        .object();
+    assert!(
+        found["kg_percent"].as_f64().unwrap() <= 1e-4,
+        "1e-6 through files: {found}"
+    );
+}
+
+#[test]
+fn samples_are_as_many_as_asked_for() {
+    let folder = tempdir().unwrap();
+    sheet(4, 13).write_objs(&folder.path().join("sheet"));
+    meshloom(folder.path(), "fit sheet -o s.loom --fps 24").done();
+    for (times, frames) in [
+        ("", 13),
+        ("--frames 30", 30),
+        ("--frames 1", 1),
+        ("--rate 2", 25),
+        ("--fps 30", 16), // floor(12 * 30/24 + 1e-9) + 1
+        ("--times 1,2.5,13", 3),
+        ("--times 1:13:0.5", 25),
+        ("--range 3:7", 5),
+        ("--range 3:7 --rate 4", 17),
+    ] {
+        let sample = format!("sample s.loom -o out/f_###.obj --json {times}");
+        assert_eq!(
+            meshloom(folder.path(), &sample).done().object()["frames"],
+            frames,
+            "{times}"
+        );
+        // Frames of the longer run before are gone.
+        assert_eq!(
+            fs::read_dir(folder.path().join("out")).unwrap().count(),
+            frames,
+            "{times}"
+        );
+    }
+    for wrong in [
+        "--frames 3 --rate 2",
+        "--times 1:0:1",
+        "--times a",
+        "--rate -1",
+        "--times 1:3:0",
+    ] {
+        let run = meshloom(folder.path(), &format!("sample s.loom -o out {wrong}"));
+        assert_eq!(run.code, Some(2), "{wrong}: {}", run.stderr);
+    }
+    // Part of a loom is that part of its frames.
+    meshloom(folder.path(), "sample s.loom -o whole").done();
+    meshloom(folder.path(), "sample s.loom -o part --range 3:7").done();
+    for frame in 1..=5 {
+        let read = |name: String| fs::read(folder.path().join(name)).unwrap();
+        let part = read(format!("part/frame_{frame:04}.obj"));
+        assert_eq!(part, read(format!("whole/frame_{:04}.obj", frame + 2)));
+    }
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bytes() {
+    let folder = tempdir().unwrap();
+    // More than 2^16 coordinates.
+    let capture = sheet(150, 6);
+    assert!(3 * capture.vertices() > 1 << 16);
+    fs::write(folder.path().join("base.obj"), capture.obj(0)).unwrap();
+    fs::write(folder.path().join("sheet.pc2"), capture.pc2()).unwrap();
+    let with = |threads: &str| {
+        let run_with = |args: String| {
+            let mut command = command(folder.path(), args.split_whitespace());
+            command.env("RAYON_NUM_THREADS", threads);
+            run(command).done();
+        };
+        run_with(format!("fit sheet.pc2 --mesh base.obj -o {threads}.loom"));
+        run_with(format!("sample {threads}.loom -o {threads}.pc2 --frames 9"));
+        ["loom", "pc2"]
+            .map(|kind| fs::read(folder.path().join(format!("{threads}.{kind}"))).unwrap())
+    };
+    let (one, two) = (with("1"), with("2"));
+    assert!(one == two, "bytes differ");
+    assert!(with("2") == two, "bytes differ between runs");
+}
+
+#[test]
+fn pins_hold_their_frames_and_are_counted() {
+    let folder = tempdir().unwrap();
+    sheet(4, 13).write_objs(&folder.path().join("sheet"));
+    let fit = "fit sheet -o s.loom --json --pin 2=0.5,-0.25 --pin 9=10%,90%";
+    let report = meshloom(folder.path(), fit).done().object();
+    assert_eq!(report["layout"]["pinned"], 2);
+    for wrong in ["2", "2=1", "2=1,x", "two=1,1"] {
+        let run = meshloom(folder.path(), &format!("fit sheet -o s.loom --pin {wrong}"));
+        assert_eq!(run.code, Some(2), "{wrong}");
+    }
+}
+
+#[test]
+fn real_captures_are_fitted_as_well_as_the_paper_says() {
+    let Some(data) = support::real_captures() else {
+        return;
+    };
+    let folder = tempdir().unwrap();
+    let horse = data.join("horse-gallop");
+    let input = format!(
+        "{} --mesh {}",
+        horse.join("frames.pc2").display(),
+        horse.join("base.obj").display()
+    );
+    meshloom(folder.path(), &format!("convert {input} -o all.pc2")).done();
+    let fit = format!(
+        "fit all.pc2 --mesh {} -o horse.loom --json --tolerance 0.02",
+        horse.join("base.obj").display()
+    );
+    let report = meshloom(folder.path(), &fit).done().object();
+    assert!(
+        report["error"]["total"].as_f64().unwrap() <= 0.02,
+        "{report}"
+    );
+    // Two strides of 24 frames: half of the frames are enough for the map.
+    assert!(report["sites"].as_u64().unwrap() <= 24, "{report}");
+}

@@ -20,7 +20,9 @@ fn capture(frames: usize) -> Sequence {
 }
 
 fn sequence(capture: Capture) -> Sequence {
-    let Content::Sequence(sequence) = capture.content;
+    let Content::Sequence(sequence) = capture.content else {
+        panic!("frames in memory");
+    };
     sequence
 }
 

@@ -17,7 +17,7 @@ use meshloom::io::Disk;
 use meshloom::loom::Loom;
 use meshloom::loom::fit::{self, FitOptions};
 use meshloom::mesh::{Bounds, FrameSource, Sequence, Topology};
-use meshloom::pipeline::{self, Content, InputSpec, PictureFormat};
+use meshloom::pipeline::{self, InputSpec, PictureFormat};
 use meshloom::plot::{Item, Path, Point, Rect, Scene, Stroke, Theme};
 use meshloom::task::Task;
 use meshloom::view::{self, Camera, Style, Surface};
@@ -69,9 +69,8 @@ impl Figure {
         let (sequence, direction) = match (&self.capture, Demo::find(demo)) {
             (Some(path), _) => {
                 let opened = pipeline::open(&Disk, &InputSpec::new(path), &Task::default())?;
-                match opened.output.content {
-                    Content::Sequence(sequence) => (sequence, [0.6, 0.25]),
-                }
+                let sequence = opened.output.content.sequence(&Task::default())?;
+                (sequence, [0.6, 0.25])
             }
             (None, Some(demo)) => ((demo.generate)(), demo.view),
             (None, None) => return Diagnostic::error(format!("no demo `{demo}`")).err(),

@@ -16,8 +16,10 @@ mod compare;
 mod completions;
 mod convert;
 mod doctor;
+mod fit;
 mod info;
 mod man;
+mod sample;
 
 use std::process::ExitCode;
 
@@ -48,6 +50,8 @@ macro_rules! commands {
 }
 
 commands! {
+    fit Fit,
+    sample Sample,
     compare Compare,
     info Info,
     convert Convert,

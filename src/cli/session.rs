@@ -1,6 +1,7 @@
 //! What a subcommand is given, and what becomes of its result.
 
 use std::cell::RefCell;
+use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::thread;
@@ -14,6 +15,7 @@ use super::progress::Progress;
 use super::threads::Threads;
 use crate::diag::{Diagnostic, Result, Warned};
 use crate::io::{Disk, abandon_stages};
+use crate::loom::Loom;
 use crate::pipeline::{self, Capture, InputSpec};
 use crate::task::{Observer, Task};
 use crate::world::World;
@@ -85,6 +87,11 @@ impl Session {
     /// Opens a capture and keeps its warnings.
     pub(super) fn open(&self, spec: &InputSpec) -> Result<Capture> {
         Ok(self.keep(pipeline::open(self.world(), spec, &self.task)?))
+    }
+
+    /// Opens a loom.
+    pub(super) fn open_loom(&self, path: &Path) -> Result<Loom> {
+        pipeline::open_loom(self.world(), path, &self.task)
     }
 
     /// Runs a subcommand and reports how it went.

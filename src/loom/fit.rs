@@ -28,6 +28,9 @@ pub enum Method {
 }
 
 impl Method {
+    /// All there are.
+    pub const ALL: &[Method] = &[Method::Ch12];
+
     /// Its name on the command line.
     pub fn name(self) -> &'static str {
         match self {
@@ -97,7 +100,9 @@ impl FitOptions {
             return Diagnostic::error("there are no frames to fit").err();
         }
         if !(0.0..=1.0).contains(&self.alpha) {
-            return Diagnostic::error(format!("alpha is {}, outside 0 to 1", self.alpha)).err();
+            return Diagnostic::error(format!("alpha is {}, outside 0 to 1", self.alpha))
+                .hint("0 gives every step the same time, 1 a time by its length; 0.5 is usual")
+                .err();
         }
         if self.fps.is_some_and(|fps| !(fps > 0.0 && fps.is_finite())) {
             return Diagnostic::error("the frame rate must be above 0").err();

@@ -37,7 +37,9 @@ pub fn check(pins: &[Pin], frames: usize) -> Result<()> {
                 .err();
         }
         if pins[..index].iter().any(|other| other.frame == frame) {
-            return Diagnostic::error(format!("frame {frame} is pinned twice")).err();
+            return Diagnostic::error(format!("frame {frame} is pinned twice"))
+                .hint("leave one of its pins out")
+                .err();
         }
         let (PinPlace::Layout(place) | PinPlace::Box(place)) = pin.at;
         if !place.iter().all(|x| x.is_finite()) {

@@ -4,6 +4,7 @@ mod frames;
 mod input;
 mod key;
 mod lanes;
+mod loom;
 mod memory;
 mod open;
 mod output;
@@ -13,6 +14,7 @@ mod save;
 
 pub use input::{FrameRange, InputSpec};
 pub use key::{Key, KeyBuilder};
+pub use loom::{is_loom, open_loom, save_loom};
 pub use memory::{Made, Memory, Remembered};
 pub use open::{Capture, Content, Origin, open};
 pub use output::{Output, Plan, plan};

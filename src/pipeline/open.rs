@@ -2,13 +2,16 @@
 //! their place in one row of f32.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::input::{self, Files, InputSpec};
 use super::lanes;
+use super::loom::{is_loom, open_as_frames};
 use crate::diag::{Diagnostic, Result, Warned};
 use crate::format::cache::CacheSource;
 use crate::format::{self, CacheFormat, FirstFrame, Kind, MeshFormat, SceneFormat};
 use crate::mesh::{FrameSource, Sequence};
+use crate::sample::Sampled;
 use crate::task::Task;
 use crate::world::World;
 
@@ -26,6 +29,8 @@ pub struct Capture {
 pub enum Content {
     /// Frames in memory.
     Sequence(Sequence),
+    /// A loom at whole times.
+    Loom(Arc<Sampled>),
 }
 
 /// Where a capture came from.
@@ -45,6 +50,11 @@ pub struct Origin {
 /// Nothing is there, what is there cannot be told apart, a file is damaged, or the frames do not share
 /// one connectivity. Cancellation.
 pub fn open(world: &dyn World, spec: &InputSpec, task: &Task) -> Result<Warned<Capture>> {
+    if let [path] = spec.paths.as_slice()
+        && is_loom(path)
+    {
+        return open_as_frames(world, path, spec, task).map(Warned::clean);
+    }
     let mut files = input::find(world, spec)?;
     let (sequence, origin) = match files.format.kind {
         Kind::Mesh(format) => read_meshes(world, spec, &files, format, task)?,
@@ -200,7 +210,7 @@ fn read_scene(
 }
 
 /// Refuses a mesh for files that have faces.
-fn no_mesh(spec: &InputSpec) -> Result<()> {
+pub(super) fn no_mesh(spec: &InputSpec) -> Result<()> {
     match &spec.mesh {
         None => Ok(()),
         Some(mesh) => Diagnostic::error("a mesh is given for files that have faces of their own")
@@ -280,7 +290,7 @@ fn first_frame(world: &dyn World, path: &Path, format: &dyn MeshFormat) -> Resul
 }
 
 /// Adds the file to what its format said, and what the file seems to be instead.
-fn in_file(mut error: Box<Diagnostic>, path: &Path, bytes: &[u8]) -> Box<Diagnostic> {
+pub(super) fn in_file(mut error: Box<Diagnostic>, path: &Path, bytes: &[u8]) -> Box<Diagnostic> {
     error.place.file = Some(path.to_path_buf());
     let ending = path.extension().unwrap_or_default().to_string_lossy();
     match format::by_content(bytes) {
