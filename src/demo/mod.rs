@@ -4,7 +4,12 @@
 //! the platform's own sine or a thread pool, so that two machines agree to the last bit.
 
 mod bar;
+mod curve;
+mod horse;
+mod implicit;
 mod lattice;
+mod skin;
+mod surface_nets;
 
 use crate::mesh::Sequence;
 
@@ -37,14 +42,32 @@ pub struct Demo {
 }
 
 /// All built-in captures, the one to start with first.
-pub const DEMOS: &[Demo] = &[Demo {
-    name: "bar",
-    about: "a square bar bends to 170 degrees, twists by half a turn, then does both",
-    kind: Kind::Motion,
-    travels: false,
-    view: [0.4, 0.3],
-    generate: bar::generate,
-}];
+pub const DEMOS: &[Demo] = &[
+    Demo {
+        name: "gallop",
+        about: "a horse gallops in place, two unequal strides",
+        kind: Kind::Motion,
+        travels: false,
+        view: [0.35, 0.1],
+        generate: horse::gallop,
+    },
+    Demo {
+        name: "walk",
+        about: "the horse walks over the ground",
+        kind: Kind::Motion,
+        travels: true,
+        view: [0.35, 0.1],
+        generate: horse::walk,
+    },
+    Demo {
+        name: "bar",
+        about: "a square bar bends to 170 degrees, twists by half a turn, then does both",
+        kind: Kind::Motion,
+        travels: false,
+        view: [0.4, 0.3],
+        generate: bar::generate,
+    },
+];
 
 impl Demo {
     /// The capture of that name.

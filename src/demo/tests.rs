@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use super::*;
 use crate::mesh::{FrameSource, Topology};
 
-/// Each directed edge once and its reverse once: closed, manifold along edges, oriented.
+/// Each directed edge once and its reverse once.
 fn is_closed(topology: &Topology) -> bool {
     let mut edges: HashMap<(u32, u32), usize> = HashMap::new();
     for polygon in topology.polygons() {
@@ -17,6 +17,40 @@ fn is_closed(topology: &Topology) -> bool {
     edges
         .iter()
         .all(|(&(a, b), &count)| count == 1 && edges.get(&(b, a)) == Some(&1))
+}
+
+/// Closed, and the triangles at each vertex make one ring.
+pub(super) fn is_closed_manifold(topology: &Topology) -> bool {
+    let mut next: Vec<HashMap<u32, u32>> = vec![HashMap::new(); topology.vertices()];
+    for &[a, b, c] in topology.triangles() {
+        for [at, from, to] in [[a, b, c], [b, c, a], [c, a, b]] {
+            next[at as usize].insert(from, to);
+        }
+    }
+    let one_ring = |ring: &HashMap<u32, u32>| {
+        let Some(&start) = ring.keys().next() else {
+            return false;
+        };
+        let (mut at, mut steps) = (ring[&start], 1);
+        while at != start && steps <= ring.len() {
+            (at, steps) = (ring.get(&at).copied().unwrap_or(start), steps + 1);
+        }
+        steps == ring.len()
+    };
+    is_closed(topology) && next.iter().all(one_ring)
+}
+
+/// The smallest triangle's area as a share of the mean.
+pub(super) fn smallest_face_share(topology: &Topology, positions: &[f32]) -> f64 {
+    let at =
+        |v: u32| nalgebra::Vector3::from(positions.as_chunks::<3>().0[v as usize]).cast::<f64>();
+    let area = |&[a, b, c]: &[u32; 3]| (at(b) - at(a)).cross(&(at(c) - at(a))).norm();
+    let areas: Vec<f64> = topology.triangles().iter().map(area).collect();
+    let mean = areas.iter().sum::<f64>() / areas.len() as f64;
+    areas
+        .iter()
+        .fold(f64::INFINITY, |least, &area| least.min(area))
+        / mean
 }
 
 fn volume(topology: &Topology, positions: &[f32]) -> f64 {
@@ -80,4 +114,39 @@ fn the_bar_meets_known_places() {
             .zip(&nearly)
             .all(|(a, b)| (a - b).abs() < 1e-7)
     );
+}
+
+/// Generated twice, at the same time on two threads.
+#[test]
+fn every_capture_is_finite_and_the_same_bytes_every_time() {
+    for demo in DEMOS {
+        let again = std::thread::spawn(demo.generate);
+        let (first, again) = ((demo.generate)(), again.join().unwrap());
+        assert_eq!(first.positions(), again.positions(), "{}", demo.name);
+        assert!(first.topology().same_connectivity(again.topology()));
+        assert!(
+            first.positions().iter().all(|value| value.is_finite()),
+            "{}",
+            demo.name
+        );
+        assert!(first.frames() > 1);
+        assert_eq!(
+            first.fps().is_some(),
+            demo.kind == Kind::Motion,
+            "{}",
+            demo.name
+        );
+    }
+}
+
+#[test]
+fn names_are_unique_and_found() {
+    for demo in DEMOS {
+        assert_eq!(
+            DEMOS.iter().filter(|other| other.name == demo.name).count(),
+            1
+        );
+        assert_eq!(Demo::find(demo.name).unwrap().about, demo.about);
+    }
+    assert!(Demo::find("unicorn").is_none());
 }
