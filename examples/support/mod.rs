@@ -135,6 +135,12 @@ pub(crate) fn first(sequence: &Sequence, count: usize) -> Sequence {
     sequence.slice(0..count.min(sequence.frames()))
 }
 
+/// The last `count` frames, or all.
+pub(crate) fn last(sequence: &Sequence, count: usize) -> Sequence {
+    let n = sequence.frames();
+    sequence.slice(n.saturating_sub(count)..n)
+}
+
 /// One direction and distance for all shapes of a figure.
 #[derive(Clone)]
 pub(crate) struct View {

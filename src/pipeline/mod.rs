@@ -11,6 +11,7 @@ mod output;
 mod picture;
 pub mod plot;
 mod save;
+mod sheet;
 
 pub use input::{FrameRange, InputSpec};
 pub use key::{Key, KeyBuilder};
@@ -20,3 +21,4 @@ pub use open::{Capture, Content, Origin, open};
 pub use output::{Output, Plan, plan};
 pub use picture::{PictureFormat, save_picture};
 pub use save::{Saved, save};
+pub use sheet::contact_sheet;

@@ -1,10 +1,15 @@
 //! A loom's signals as the plain series that plots are drawn from, and the figure of both.
 
+use super::output::Output;
+use super::picture::save_picture;
+use super::save::Saved;
+use crate::diag::Result;
 use crate::loom::Loom;
 use crate::math::b_spline::Point;
 use crate::plot::{Anchor, PoseSpace, Scene, Theme, TimeSignals, pose_space, time_signals};
 use crate::signal::pose::PoseSignal;
 use crate::signal::time::TimeSignal;
+use crate::world::World;
 
 /// What is known about the frames that signals were fitted to; any of it may be missing.
 #[derive(Debug, Clone, Copy, Default)]
@@ -31,6 +36,22 @@ pub fn plot_loom(loom: &Loom) -> (PoseSpace, TimeSignals) {
         errors: &loom.frame_errors(),
     };
     series(loom.time(), loom.pose(), &fitted)
+}
+
+/// Size of the figure in a file, in pixels at scale 1.
+const FIGURE: [f32; 2] = [1280.0, 560.0];
+
+/// Pixels to the figure's unit in a PNG file: sharp where it is printed or shown at its size.
+const SHARP: f32 = 2.0;
+
+/// Writes the figure of a loom to a file, PNG or SVG by its ending.
+///
+/// # Errors
+/// As [`save_picture`].
+pub fn save_plot(world: &dyn World, loom: &Loom, output: &Output, theme: &Theme) -> Result<Saved> {
+    let (map, signals) = plot_loom(loom);
+    let scene = figure(&map, &signals, &caption(loom), FIGURE, theme);
+    save_picture(world, &scene, output, SHARP)
 }
 
 /// One line about a loom: what it has and how well it fits.
@@ -166,6 +187,7 @@ mod tests {
     use crate::math::thin_plate::Rows;
     use crate::plot::Item;
     use crate::signal::warp::Warp;
+    use crate::world::MemoryWorld;
 
     fn circle(n: usize) -> Vec<Point> {
         let angle = |i: usize| 5.0 * i as f64 / n as f64;
@@ -217,6 +239,9 @@ mod tests {
         assert_eq!(map.pins, [(3, [0.5, 0.25])]);
         assert_eq!(plots.frames.len(), loom.frames());
         assert!(caption(&loom).starts_with("15 frames, k = "));
+        let world = MemoryWorld::new();
+        save_plot(&world, &loom, &"a/pose.svg".into(), &Theme::dark()).unwrap();
+        assert_eq!(world.paths(), [std::path::Path::new("a/pose.svg")]);
     }
 
     #[test]

@@ -9,7 +9,7 @@ use super::legend::{Legend, Mark, arrow};
 use super::scene::{Path, Point, Rect, Scene, Stroke};
 use super::text::CAP_HEIGHT;
 use super::theme::Theme;
-use super::{Anchor, Item, Scale};
+use super::{Anchor, Color, Item, Scale};
 use crate::image::Image;
 
 /// What the map shows; any of the lists may be empty. Points that are not finite are left out.
@@ -131,10 +131,13 @@ impl PoseSpace {
         let marks = Marks::of(theme);
         self.draw_pictures(scene, plane);
         self.draw_controls(scene, plane, theme);
-        self.draw_curve(scene, plane, theme);
+        let steps = self.steps(plane);
+        self.draw_curve(scene, &steps, theme);
         self.draw_links(scene, plane, theme);
         draw_all(scene, plane, theme, marks.site, &self.sites);
-        self.draw_frames(scene, plane, theme);
+        self.draw_dots(scene, plane, theme);
+        self.draw_arrows(scene, &steps, theme);
+        self.draw_marked(scene, plane, theme);
         for (_, at) in self.pins.iter().filter(|(_, at)| finite(at)) {
             marks.pin.draw(scene, theme, plane.pixel(*at));
         }
@@ -164,28 +167,41 @@ impl PoseSpace {
         corners.iter().for_each(|&at| mark.draw(scene, theme, at));
     }
 
-    fn draw_curve(&self, scene: &mut Scene, plane: &Plane, theme: &Theme) {
-        let [first, last] = self.time_range().unwrap_or([0.0, 1.0]);
-        let color = |t: f64| theme.time((t - first) / (last - first));
+    /// The curve in pixels with its times, in steps that can be seen.
+    fn steps(&self, plane: &Plane) -> Vec<(Point, f64)> {
         let both = self.curve.iter().zip(&self.times);
         let finite = both.filter(|(at, _)| finite(at));
-        let mut places: Vec<(Point, f64)> = finite.map(|(at, &t)| (plane.pixel(*at), t)).collect();
-        places.dedup_by(|next, kept| distance(next.0, kept.0) < 0.8); // no step that could be seen
-        let points: Vec<Point> = places.iter().map(|(at, _)| *at).collect();
-        let arrows = arrows(&points, theme);
+        let mut steps: Vec<_> = finite.map(|(at, &t)| (plane.pixel(*at), t)).collect();
+        steps.dedup_by(|next, kept| distance(next.0, kept.0) < 0.8);
+        steps
+    }
+
+    /// The colour of a time on this map.
+    fn colors(&self, theme: &Theme) -> impl Fn(f64) -> Color {
+        let [first, last] = self.time_range().unwrap_or([0.0, 1.0]);
+        move |t| theme.time((t - first) / (last - first))
+    }
+
+    fn draw_curve(&self, scene: &mut Scene, steps: &[(Point, f64)], theme: &Theme) {
         if let Some([from, to]) = self.span {
-            let inside = places.iter().filter(|(_, t)| (from..=to).contains(t));
+            let inside = steps.iter().filter(|(_, t)| (from..=to).contains(t));
             let inside: Vec<Point> = inside.map(|(at, _)| *at).collect();
             let wide = Stroke::new(theme.ink.with_alpha(0.85), 6.5 * theme.unit());
             scene.stroke(Path::polyline(&inside), wide);
         }
+        let color = self.colors(theme);
         scene.items.push(Item::Curve {
-            points,
-            colors: places.iter().map(|(_, t)| color(*t)).collect(),
+            points: steps.iter().map(|(at, _)| *at).collect(),
+            colors: steps.iter().map(|(_, t)| color(*t)).collect(),
             width: 2.2 * theme.unit(),
         });
-        for (i, at, direction) in arrows {
-            arrow(scene, at, direction, color(places[i].1), theme);
+    }
+
+    fn draw_arrows(&self, scene: &mut Scene, steps: &[(Point, f64)], theme: &Theme) {
+        let points: Vec<Point> = steps.iter().map(|(at, _)| *at).collect();
+        let color = self.colors(theme);
+        for (i, at, direction) in arrows(&points, theme) {
+            arrow(scene, at, direction, color(steps[i].1), theme);
         }
     }
 
@@ -200,9 +216,9 @@ impl PoseSpace {
         }
     }
 
-    fn draw_frames(&self, scene: &mut Scene, plane: &Plane, theme: &Theme) {
+    /// Shown frames, marked points, and the last frame.
+    fn draw_marked(&self, scene: &mut Scene, plane: &Plane, theme: &Theme) {
         let marks = Marks::of(theme);
-        self.draw_dots(scene, plane, theme);
         let shown = self.shown.iter().filter_map(|&frame| self.place(frame));
         let marked = self.marked.iter().filter(|at| finite(at)).copied();
         for at in shown.chain(marked) {
@@ -228,9 +244,9 @@ impl PoseSpace {
             .collect();
         gaps.sort_by(f32::total_cmp);
         let gap = gaps.get(gaps.len() / 2).copied().unwrap_or(f32::INFINITY);
-        let radius = (0.28 * gap).clamp(1.3 * unit, 2.4 * unit);
+        let radius = (0.2 * gap).clamp(1.2 * unit, 2.4 * unit);
         for &at in &places {
-            scene.disc(at, radius + 0.8 * unit, theme.background);
+            scene.disc(at, 1.33 * radius, theme.background);
         }
         for &at in &places {
             scene.disc(at, radius, theme.ink);

@@ -64,6 +64,12 @@ impl Theme {
         }
     }
 
+    /// Whether the background is darker than the ink.
+    pub fn is_dark(&self) -> bool {
+        let sum = |color: Color| color.0[..3].iter().map(|&c| u32::from(c)).sum::<u32>();
+        sum(self.background) < sum(self.ink)
+    }
+
     /// The same colours with text of another size in pixels (0: none).
     #[must_use]
     pub fn with_text(mut self, size: f32) -> Self {
