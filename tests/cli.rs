@@ -7,7 +7,7 @@ use std::io::Read;
 use std::process::Stdio;
 
 use support::capture::sheet;
-use support::{command, keys, meshloom, run};
+use support::{command, keys, meshloom, run, subcommands};
 use tempfile::tempdir;
 
 #[test]
@@ -191,21 +191,15 @@ fn help_and_version_are_asked_for_and_go_to_stdout() {
 #[test]
 fn completions_and_manual_name_every_subcommand() {
     let folder = tempdir().unwrap();
-    let help = meshloom(folder.path(), "--help").done().stdout;
-    let commands = help.lines().skip_while(|line| *line != "Commands:").skip(1);
-    let commands: Vec<&str> = commands
-        .take_while(|line| !line.is_empty())
-        .filter_map(|line| line.split_whitespace().next())
-        .filter(|name| *name != "help")
-        .collect();
-    assert!(commands.contains(&"info"));
+    let commands = subcommands();
+    assert!(commands.iter().any(|name| name == "info"));
     let manual = meshloom(folder.path(), "man").done().stdout;
     for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
         let script = meshloom(folder.path(), &format!("completions {shell}"))
             .done()
             .stdout;
         for name in &commands {
-            assert!(script.contains(name), "{shell}: {name}");
+            assert!(script.contains(name.as_str()), "{shell}: {name}");
         }
     }
     for name in commands {
@@ -646,4 +640,67 @@ fn real_captures_are_fitted_as_well_as_the_paper_says() {
     );
     // Two strides of 24 frames: half of the frames are enough for the map.
     assert!(report["sites"].as_u64().unwrap() <= 24, "{report}");
+}
+
+#[test]
+fn a_demo_writes_loom_picture_and_in_betweens() {
+    let folder = tempdir().unwrap();
+    let demos = meshloom(folder.path(), "demo --list --json")
+        .done()
+        .object();
+    let names: Vec<String> = demos["demos"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|demo| demo["name"].as_str().unwrap().to_string())
+        .collect();
+    assert!(
+        names.contains(&"bar".to_string())
+            && names.len()
+                == names
+                    .iter()
+                    .collect::<std::collections::BTreeSet<_>>()
+                    .len()
+    );
+    let demo = meshloom(folder.path(), "demo bar --write new/place --json")
+        .done()
+        .object();
+    assert_eq!(demo["demo"], "bar");
+    assert!(demo["report"]["error"]["total"].as_f64().unwrap() <= 0.01);
+    for output in demo["outputs"].as_array().unwrap() {
+        assert!(
+            folder.path().join(output.as_str().unwrap()).is_file(),
+            "{output}"
+        );
+    }
+    let place = folder.path().join("new/place");
+    let info = meshloom(&place, "info bar.loom --json").done().object();
+    let written = fs::read_dir(place.join("frames")).unwrap().count() as u64;
+    assert_eq!(written, 2 * info["frames"].as_u64().unwrap() - 1);
+    assert_eq!(demo["frames"].as_u64().unwrap(), written);
+    assert_eq!(meshloom(folder.path(), "demo nonsense").code, Some(2));
+}
+
+#[test]
+fn a_plot_is_png_or_svg_by_its_ending() {
+    let folder = tempdir().unwrap();
+    sheet(4, 13).write_objs(&folder.path().join("sheet"));
+    meshloom(folder.path(), "fit sheet -o s.loom").done();
+    for (name, start) in [("a/p.png", &b"\x89PNG"[..]), ("p.svg", b"<svg")] {
+        meshloom(
+            folder.path(),
+            &format!("plot s.loom -o {name} --theme dark"),
+        )
+        .done();
+        let bytes = fs::read(folder.path().join(name)).unwrap();
+        assert!(bytes.starts_with(start), "{name}");
+    }
+    let size = |args: &str| {
+        meshloom(folder.path(), &format!("plot s.loom -o p.png {args}")).done();
+        let bytes = fs::read(folder.path().join("p.png")).unwrap();
+        [16, 20].map(|at: usize| u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap()))
+    };
+    assert_eq!(size("--size 500x300"), [1000, 600]);
+    meshloom(folder.path(), "plot s.loom -o p.jpg").fails_with(&["p.jpg", ".png"]);
+    meshloom(folder.path(), "plot s.loom -o s.loom").fails_with(&["s.loom"]);
 }

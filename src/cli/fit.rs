@@ -6,7 +6,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use serde_json::{Value, json};
 
 use super::args::{Input, positive};
-use super::report::{self, number, percent};
+use super::report::{count, number, percent, table};
 use super::session::{Outcome, Session};
 use crate::diag::Result;
 use crate::loom::Loom;
@@ -19,7 +19,7 @@ use crate::signal::root::RootKind;
 use crate::space::SPACES;
 
 /// The phases whose times are reported.
-const PHASES: [&str; 6] = ["load", "encode", "shape", "layout", "pose", "time"];
+pub(super) const PHASES: [&str; 6] = ["load", "encode", "shape", "layout", "pose", "time"];
 
 /// Fit a loom to a capture
 #[derive(Debug, clap::Args)]
@@ -90,7 +90,7 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<Outcome> {
     let loom = fitted(session, &sequence, &args.how.options())?;
     pipeline::save_loom(session.world(), &loom, &output, &session.task)?;
     Ok(Outcome {
-        object: object(session, loom.report()),
+        object: report(session, loom.report()),
         report: summary(session, &args.output.display().to_string(), loom.report()),
         ..Outcome::default()
     })
@@ -120,7 +120,7 @@ impl How {
 }
 
 /// The report as data, with the time each phase took. The session adds the warnings.
-pub(super) fn object(session: &Session, report: &FitReport) -> Value {
+pub(super) fn report(session: &Session, report: &FitReport) -> Value {
     let mut object = json!(report);
     object["seconds"] = session.progress.seconds(&PHASES);
     object["warnings"] = json!([]);
@@ -138,9 +138,9 @@ pub(super) fn summary(session: &Session, title: &str, report: &FitReport) -> Str
             "capture",
             format!(
                 "{}, {}, {}",
-                report::count(report.frames, "frame"),
+                count(report.frames, "frame"),
                 format_args!("{} vertices", report.vertices),
-                report::count(report.faces, "face")
+                count(report.faces, "face")
             ),
         ),
         (
@@ -187,14 +187,14 @@ pub(super) fn summary(session: &Session, title: &str, report: &FitReport) -> Str
         format!(
             "stress {}, {}",
             number(report.stress),
-            report::count(layout.steps, "step")
+            count(layout.steps, "step")
         ),
     ));
     rows.push((
         "took",
         format!("{} s", number(seconds["total"].as_f64().unwrap_or(0.0))),
     ));
-    report::table(session.style, title, &rows)
+    table(session.style, title, &rows)
 }
 
 fn methods() -> impl TypedValueParser<Value = Method> {

@@ -15,10 +15,12 @@ mod threads;
 mod compare;
 mod completions;
 mod convert;
+mod demo;
 mod doctor;
 mod fit;
 mod info;
 mod man;
+mod plot;
 mod sample;
 
 use std::process::ExitCode;
@@ -50,11 +52,13 @@ macro_rules! commands {
 }
 
 commands! {
+    demo Demo,
     fit Fit,
     sample Sample,
     compare Compare,
     info Info,
     convert Convert,
+    plot Plot,
     doctor Doctor,
     completions Completions,
     man Man,

@@ -85,6 +85,19 @@ impl Run {
     }
 }
 
+/// The subcommands that the help lists, `help` apart.
+pub fn subcommands() -> Vec<String> {
+    let help = meshloom(Path::new("."), "--help").done().stdout;
+    let commands = help.lines().skip_while(|line| *line != "Commands:").skip(1);
+    commands
+        .take_while(|line| !line.is_empty())
+        .filter(|line| line.starts_with("  ") && !line.starts_with("   "))
+        .filter_map(|line| line.split_whitespace().next())
+        .filter(|name| *name != "help")
+        .map(String::from)
+        .collect()
+}
+
 /// The names of an object's entries, sorted.
 pub fn keys(object: &Value) -> Vec<&str> {
     let map = object.as_object().expect("an object");
