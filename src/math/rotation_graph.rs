@@ -8,6 +8,7 @@
 //! is the weighted Laplacian of the graph (n unknowns, 3 right sides); it depends on the links only and
 //! is factored once.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 use nalgebra::{UnitQuaternion, Vector3};
@@ -39,23 +40,44 @@ impl RotationGraph {
     /// # Errors
     /// The system is too large or has weights that are not positive.
     pub fn new(nodes: usize, links: Vec<[u32; 2]>, weights: Vec<f64>) -> Result<Self, SparseError> {
+        let analysis = Analysis::new(Pattern::new(nodes, links.iter().copied()))?;
+        RotationGraph::on(&analysis, links, weights)
+    }
+
+    /// As [`RotationGraph::new`], on a pattern that has been analysed before and has an entry for each
+    /// link.
+    ///
+    /// # Errors
+    /// As [`RotationGraph::new`].
+    pub fn on(
+        analysis: &Arc<Analysis>,
+        links: Vec<[u32; 2]>,
+        weights: Vec<f64>,
+    ) -> Result<Self, SparseError> {
+        let nodes = analysis.pattern().unknowns();
         let (starts, neighbours) = incidence(nodes, &links);
-        let mut graph = RotationGraph {
-            factor: Analysis::new(Pattern::new(0, std::iter::empty()))?.factor(&[])?,
-            tree: Vec::new(),
+        let tree = spanning_forest(&links, (&starts, &neighbours), &|_| true);
+        let factor = laplacian(analysis, &links, &weights, &tree)?;
+        Ok(RotationGraph {
             links,
             weights,
             starts,
             neighbours,
-        };
-        graph.tree = graph.spanning_forest(&|_| true);
-        graph.factor = graph.laplacian(nodes)?;
-        Ok(graph)
+            tree,
+            factor,
+        })
     }
 
     /// The links.
     pub fn links(&self) -> &[[u32; 2]] {
         &self.links
+    }
+
+    /// The factored Laplacian of the links, the lowest node of each connected part held at zero: good for
+    /// any least-squares system of weighted differences along the links whose right sides sum to zero
+    /// over each part.
+    pub fn factor(&self) -> &Factor {
+        &self.factor
     }
 
     /// Finds the rotations of all nodes from the rotation of each link's second node relative to its
@@ -111,7 +133,10 @@ impl RotationGraph {
         };
         match (0..self.links.len()).all(trusted) {
             true => walk(&self.tree, rotations),
-            false => walk(&self.spanning_forest(trusted), rotations),
+            false => {
+                let incidence = (&self.starts[..], &self.neighbours[..]);
+                walk(&spanning_forest(&self.links, incidence, trusted), rotations);
+            }
         }
     }
 
@@ -140,91 +165,75 @@ impl RotationGraph {
         }
         largest.sqrt()
     }
+}
 
-    /// (link, node it leads to) in an order that starts at the lowest node of each part; trusted links
-    /// first.
-    fn spanning_forest(&self, trusted: &dyn Fn(usize) -> bool) -> Vec<(u32, u32)> {
-        let nodes = self.starts.len() - 1;
-        let mut seen = vec![false; nodes];
-        let mut tree = Vec::with_capacity(nodes);
-        let mut queue = std::collections::VecDeque::new();
-        let mut doubtful = std::collections::VecDeque::new();
-        for root in 0..nodes {
-            if seen[root] {
-                continue;
-            }
-            seen[root] = true;
-            queue.push_back(root);
-            loop {
-                let Some(node) = queue.pop_front() else {
-                    let Some((link, to)) = doubtful.pop_front() else {
-                        break;
-                    };
-                    self.reach(link, to, &mut seen, &mut tree, &mut queue);
-                    continue;
-                };
-                for &link in self.at(node) {
-                    let [i, j] = self.links[link as usize];
-                    let to = if i as usize == node { j } else { i };
-                    match trusted(link as usize) {
-                        true => self.reach(link, to, &mut seen, &mut tree, &mut queue),
-                        false => doubtful.push_back((link, to)),
-                    }
-                }
+/// (link, node it leads to) in an order that starts at the lowest node of each part; trusted links first.
+fn spanning_forest(
+    links: &[[u32; 2]],
+    (starts, neighbours): (&[u32], &[u32]),
+    trusted: &dyn Fn(usize) -> bool,
+) -> Vec<(u32, u32)> {
+    let nodes = starts.len() - 1;
+    let mut seen = vec![false; nodes];
+    let mut tree = Vec::with_capacity(nodes);
+    let (mut sure, mut doubtful) = (VecDeque::new(), VecDeque::new());
+    let spread = |node: u32, sure: &mut VecDeque<_>, doubtful: &mut VecDeque<_>| {
+        let node = node as usize;
+        for &link in &neighbours[starts[node] as usize..starts[node + 1] as usize] {
+            let [i, j] = links[link as usize];
+            let step = (link, if i as usize == node { j } else { i });
+            match trusted(link as usize) {
+                true => sure.push_back(step),
+                false => doubtful.push_back(step),
             }
         }
-        tree
-    }
-
-    fn reach(
-        &self,
-        link: u32,
-        to: u32,
-        seen: &mut [bool],
-        tree: &mut Vec<(u32, u32)>,
-        queue: &mut std::collections::VecDeque<usize>,
-    ) {
-        if !seen[to as usize] {
-            seen[to as usize] = true;
-            tree.push((link, to));
-            queue.push_back(to as usize);
+    };
+    for root in 0..nodes {
+        if std::mem::replace(&mut seen[root], true) {
+            continue;
         }
-    }
-
-    /// The links at a node.
-    fn at(&self, node: usize) -> &[u32] {
-        &self.neighbours[self.starts[node] as usize..self.starts[node + 1] as usize]
-    }
-
-    /// The weighted Laplacian, the lowest node of each part held by a spring that no solution
-    /// stretches.
-    fn laplacian(&self, nodes: usize) -> Result<Factor, SparseError> {
-        let analysis: Arc<Analysis> =
-            Analysis::new(Pattern::new(nodes, self.links.iter().copied()))?;
-        let pattern = analysis.pattern();
-        let mut entries = vec![0.0; pattern.entries()];
-        let mut add = |i: u32, j: u32, value: f64| {
-            if let Some(at) = pattern.entry(i as usize, j as usize) {
-                entries[at] += value;
-            }
-        };
-        for (&[i, j], &weight) in self.links.iter().zip(&self.weights) {
-            if i != j {
-                add(i, i, weight);
-                add(j, j, weight);
-                add(i, j, -weight);
+        spread(root as u32, &mut sure, &mut doubtful);
+        while let Some((link, to)) = sure.pop_front().or_else(|| doubtful.pop_front()) {
+            if !std::mem::replace(&mut seen[to as usize], true) {
+                tree.push((link, to));
+                spread(to, &mut sure, &mut doubtful);
             }
         }
-        let mut root = vec![true; nodes];
-        for &(_, to) in &self.tree {
-            root[to as usize] = false;
-        }
-        let spring = self.weights.iter().sum::<f64>() / self.weights.len().max(1) as f64;
-        for node in (0..nodes).filter(|&node| root[node]) {
-            add(node as u32, node as u32, spring.max(f64::MIN_POSITIVE));
-        }
-        analysis.factor(&entries)
     }
+    tree
+}
+
+/// The weighted Laplacian, the lowest node of each part held by a spring that no solution stretches.
+fn laplacian(
+    analysis: &Arc<Analysis>,
+    links: &[[u32; 2]],
+    weights: &[f64],
+    tree: &[(u32, u32)],
+) -> Result<Factor, SparseError> {
+    let pattern = analysis.pattern();
+    let mut entries = vec![0.0; pattern.entries()];
+    let mut add = |i: u32, j: u32, value: f64| {
+        if let Some(at) = pattern.entry(i as usize, j as usize) {
+            entries[at] += value;
+        }
+    };
+    for (&[i, j], &weight) in links.iter().zip(weights) {
+        if i != j {
+            add(i, i, weight);
+            add(j, j, weight);
+            add(i, j, -weight);
+        }
+    }
+    let mut root = vec![true; pattern.unknowns()];
+    for &(_, to) in tree {
+        root[to as usize] = false;
+    }
+    let mean = weights.iter().sum::<f64>() / weights.len().max(1) as f64;
+    let spring = if mean > 0.0 { mean } else { 1.0 };
+    for node in (0..root.len()).filter(|&node| root[node]) {
+        add(node as u32, node as u32, spring);
+    }
+    analysis.factor(&entries)
 }
 
 /// For every node the links at it.

@@ -20,6 +20,6 @@ pub use edges::Edges;
 pub use gradients::{Polar, ReferenceTriangle};
 pub use hinges::{Hinge, Hinges, NO_EDGE};
 pub use patches::grow_patches;
-pub use poisson::{Poisson, PoissonAnalysis};
+pub use poisson::{Poisson, PoissonAnalysis, reference_triangles};
 pub use sequence::{FrameSource, Sequence};
 pub use topology::{Attributes, Group, GroupKind, Topology, TopologyError};

@@ -46,6 +46,11 @@ impl PoissonAnalysis {
         &self.components
     }
 
+    /// The pattern of the vertices that share a triangle, analysed.
+    pub fn symbolic(&self) -> &Arc<Analysis> {
+        &self.symbolic
+    }
+
     /// The triangles.
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
@@ -60,7 +65,7 @@ impl PoissonAnalysis {
 /// The factored system of one reference pose.
 pub struct Poisson {
     analysis: Arc<PoissonAnalysis>,
-    reference: Vec<ReferenceTriangle>,
+    reference: Arc<[ReferenceTriangle]>,
     factor: Factor,
     pool: Mutex<Vec<Workspace>>,
 }
@@ -72,13 +77,15 @@ struct Workspace {
 }
 
 impl Poisson {
-    /// Factors the system for a reference pose of 3V positions.
+    /// Factors the system for the triangles of a reference pose ([`reference_triangles`]).
     ///
     /// # Errors
     /// The pose has numbers that are not finite, or a size that double precision does not hold; the
     /// unknown is then a vertex.
-    pub fn new(analysis: Arc<PoissonAnalysis>, pose: &[f64]) -> Result<Self, SparseError> {
-        let reference = reference_triangles(&analysis.triangles, pose);
+    pub fn new(
+        analysis: Arc<PoissonAnalysis>,
+        reference: Arc<[ReferenceTriangle]>,
+    ) -> Result<Self, SparseError> {
         let entries = laplacian(&analysis, &reference);
         let factor = analysis.symbolic.factor(&entries)?;
         Ok(Poisson {
@@ -95,7 +102,7 @@ impl Poisson {
     }
 
     /// The triangles of the reference pose.
-    pub fn reference(&self) -> &[ReferenceTriangle] {
+    pub fn reference(&self) -> &Arc<[ReferenceTriangle]> {
         &self.reference
     }
 
@@ -166,8 +173,9 @@ impl std::fmt::Debug for Poisson {
     }
 }
 
-/// The triangles of a pose, those without a plane replaced on the scale of the mean side.
-fn reference_triangles(triangles: &[[u32; 3]], pose: &[f64]) -> Vec<ReferenceTriangle> {
+/// The triangles of a pose of 3V positions, those without a plane replaced on the scale of the mean
+/// side.
+pub fn reference_triangles(triangles: &[[u32; 3]], pose: &[f64]) -> Arc<[ReferenceTriangle]> {
     let corner = |vertex: u32| point(pose, vertex as usize);
     let total: f64 = triangles
         .iter()
@@ -253,7 +261,7 @@ mod tests {
 
     fn solve(triangles: &[[u32; 3]], pose: &[f64]) -> Vec<f64> {
         let analysis = PoissonAnalysis::new(pose.len() / 3, triangles).unwrap();
-        let poisson = Poisson::new(analysis, pose).unwrap();
+        let poisson = Poisson::new(analysis, reference_triangles(triangles, pose)).unwrap();
         let mut positions = vec![f64::NAN; pose.len()];
         poisson.solve(
             |face| {
@@ -304,7 +312,7 @@ mod tests {
         let analysis = PoissonAnalysis::new(3, &[[0, 1, 2]]).unwrap();
         let pose = [0.0, 0.0, 0.0, 1.0, 0.0, f64::NAN, 0.0, 1.0, 0.0];
         assert!(matches!(
-            Poisson::new(analysis, &pose),
+            Poisson::new(analysis, reference_triangles(&[[0, 1, 2]], &pose)),
             Err(SparseError::NotPositiveDefinite { unknown: 0..3 })
         ));
     }

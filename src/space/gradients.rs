@@ -14,14 +14,15 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
+use super::orientation::polar_factors;
 use super::placement::{Placement, blocks_from, follow_rotation, triple};
 use super::registry::State;
 use super::scales::{Scales, area_shares};
 use super::{Block, Invariance, ShapeSpace};
-use crate::math::rotation::{exp, log, nearest};
+use crate::math::rotation::{exp, log};
 use crate::mesh::{Poisson, Polar, ReferenceTriangle};
 
 /// Triangles that one thread takes at a time; sums are taken chunk by chunk in this order.
@@ -100,7 +101,9 @@ impl ShapeSpace for Gradients {
 
     fn encode(&self, positions: &[f64], coordinates: &mut [f64]) {
         let mut polars = self.lock().pop().unwrap_or_default();
-        let mean = polar_factors(&self.poisson, positions, &mut polars);
+        let triangles = self.poisson.analysis().triangles();
+        let reference = self.poisson.reference();
+        let mean = polar_factors(reference, triangles, positions, &mut polars);
         let [rotations, stretches, placement] = self.split(coordinates);
         encode_stretches(
             &self.poisson,
@@ -160,58 +163,6 @@ impl Gradients {
     fn lock(&self) -> std::sync::MutexGuard<'_, Vec<Vec<Polar>>> {
         self.pool.lock().unwrap_or_else(PoisonError::into_inner)
     }
-}
-
-/// The polar factors of all triangles of a shape and its mean rotation: the rotation nearest the
-/// area-weighted sum of the triangles' rotations, those without a plane (in the reference or the shape)
-/// left out.
-pub(super) fn polar_factors(
-    poisson: &Poisson,
-    positions: &[f64],
-    polars: &mut Vec<Polar>,
-) -> UnitQuaternion<f64> {
-    let triangles = poisson.analysis().triangles();
-    let reference = poisson.reference();
-    let sides = |face: usize| {
-        let [a, b, c] = triangles[face].map(|vertex| triple(positions, vertex as usize));
-        [b - a, c - a]
-    };
-    polars.resize(
-        triangles.len(),
-        Polar {
-            rotation: UnitQuaternion::identity(),
-            stretch: [0.0; 3],
-        },
-    );
-    let sums: Vec<(Matrix3<f64>, Vec<usize>)> = polars
-        .par_chunks_mut(CHUNK)
-        .enumerate()
-        .map(|(chunk, polars)| {
-            let mut sum = Matrix3::zeros();
-            let mut flat = Vec::new();
-            for (at, out) in polars.iter_mut().enumerate() {
-                let face = CHUNK * chunk + at;
-                let [e1, e2] = sides(face);
-                match reference[face].polar(&e1, &e2) {
-                    Some(polar) => {
-                        if !reference[face].degenerate {
-                            let turn = polar.rotation.to_rotation_matrix();
-                            sum += turn.matrix() * reference[face].area();
-                        }
-                        *out = polar;
-                    }
-                    None => flat.push(face),
-                }
-            }
-            (sum, flat)
-        })
-        .collect();
-    let mean = nearest(&sums.iter().map(|(sum, _)| sum).sum()).rotation;
-    for face in sums.into_iter().flat_map(|(_, flat)| flat) {
-        let [e1, e2] = sides(face);
-        polars[face] = reference[face].polar_near(&e1, &e2, &mean);
-    }
-    mean
 }
 
 /// Writes xx, xy, xz, yy, yz, zz of each triangle's S, times `weight` and share; off-diagonal entries

@@ -12,6 +12,8 @@
 //!   over all vertices of their squared displacements: see [`Block`].
 
 mod gradients;
+mod lri;
+mod orientation;
 mod patch_lri;
 mod placement;
 mod registry;
@@ -23,6 +25,7 @@ use std::fmt;
 use std::ops::Range;
 
 pub use gradients::Gradients;
+pub use lri::Lri;
 pub use patch_lri::PatchLri;
 pub use registry::{SPACES, SpaceKind, Spaces, State};
 pub use sequence::{LARGE_TURN, encode_frames};

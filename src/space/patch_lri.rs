@@ -18,7 +18,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use nalgebra::{Matrix3, UnitQuaternion};
 use rayon::prelude::*;
 
-use super::gradients::{decode_stretch, encode_stretches, polar_factors};
+use super::gradients::{decode_stretch, encode_stretches};
+use super::orientation::polar_factors;
 use super::placement::{Placement, blocks_from, follow_rotation, triple};
 use super::registry::State;
 use super::scales::{Scales, area_shares};
@@ -73,7 +74,8 @@ impl PatchLri {
             .step_by(step)
             .map(|pose| {
                 let mut polars = Vec::new();
-                polar_factors(&poisson, pose, &mut polars);
+                let triangles = poisson.analysis().triangles();
+                polar_factors(poisson.reference(), triangles, pose, &mut polars);
                 polars.iter().map(|polar| polar.rotation).collect()
             })
             .collect();
@@ -146,7 +148,11 @@ impl PatchLri {
     /// The rotation of each patch.
     fn patch_rotations(&self, polars: &[Polar]) -> Vec<UnitQuaternion<f64>> {
         let mut sums = vec![Matrix3::zeros(); self.patches.len()];
-        let faces = self.patch.iter().zip(polars).zip(self.poisson.reference());
+        let faces = self
+            .patch
+            .iter()
+            .zip(polars)
+            .zip(&self.poisson.reference()[..]);
         for ((&patch, polar), triangle) in faces {
             let turn = polar.rotation.to_rotation_matrix();
             sums[patch as usize] += turn.matrix() * triangle.area();
@@ -231,7 +237,8 @@ impl ShapeSpace for PatchLri {
 
     fn encode(&self, positions: &[f64], coordinates: &mut [f64]) {
         let mut polars = self.lock().pop().unwrap_or_default();
-        polar_factors(&self.poisson, positions, &mut polars);
+        let triangles = self.poisson.analysis().triangles();
+        polar_factors(self.poisson.reference(), triangles, positions, &mut polars);
         let turns = self.patch_rotations(&polars);
         let [stretches, pairs, placement] = self.starts();
         let (coordinates, rest) = coordinates.split_at_mut(pairs);

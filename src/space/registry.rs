@@ -2,8 +2,10 @@
 
 use std::sync::{Arc, OnceLock};
 
-use super::{Block, Gradients, PatchLri, ShapeSpace, SpaceError, Vertices};
-use crate::mesh::{Hinges, Poisson, PoissonAnalysis, Topology};
+use super::{Block, Gradients, Lri, PatchLri, ShapeSpace, SpaceError, Vertices};
+use crate::mesh::{
+    Hinges, Poisson, PoissonAnalysis, ReferenceTriangle, Topology, reference_triangles,
+};
 
 /// A kind of shape space.
 pub struct SpaceKind {
@@ -36,11 +38,29 @@ pub const SPACES: &[SpaceKind] = &[
         },
     },
     SpaceKind {
+        name: "lri",
+        summary: "edges in the frames of their ends: for local motions of any size",
+        build: lri,
+    },
+    SpaceKind {
         name: "patch-lri",
         summary: "rotations relative to patches, patches to each other: for the largest motions",
         build: patch_lri,
     },
 ];
+
+fn lri(
+    spaces: &Spaces,
+    _: &[&[f64]],
+    _: Option<&State>,
+) -> Result<Arc<dyn ShapeSpace>, SpaceError> {
+    Ok(Arc::new(Lri::new(
+        &spaces.analysis()?,
+        spaces.reference(),
+        spaces.rest(),
+        spaces.hinges()?,
+    )?))
+}
 
 fn patch_lri(
     spaces: &Spaces,
@@ -90,6 +110,7 @@ pub struct Spaces {
     reference: Arc<[f64]>,
     analysis: Arc<OnceLock<Result<Arc<PoissonAnalysis>, SpaceError>>>,
     hinges: Arc<OnceLock<Arc<Hinges>>>,
+    rest: OnceLock<Arc<[ReferenceTriangle]>>,
     poisson: OnceLock<Result<Arc<Poisson>, SpaceError>>,
 }
 
@@ -109,6 +130,7 @@ impl Spaces {
             reference: reference.into(),
             analysis: Arc::default(),
             hinges: Arc::default(),
+            rest: OnceLock::new(),
             poisson: OnceLock::new(),
         }
     }
@@ -191,9 +213,15 @@ impl Spaces {
         self.analysis.get_or_init(analyse).clone()
     }
 
+    /// The triangles of the reference pose.
+    fn rest(&self) -> Arc<[ReferenceTriangle]> {
+        let make = || reference_triangles(self.topology.triangles(), &self.reference);
+        Arc::clone(self.rest.get_or_init(make))
+    }
+
     /// The factored system that finds positions from gradients.
     fn poisson(&self) -> Result<Arc<Poisson>, SpaceError> {
-        let factor = || Ok(Arc::new(Poisson::new(self.analysis()?, &self.reference)?));
+        let factor = || Ok(Arc::new(Poisson::new(self.analysis()?, self.rest())?));
         self.poisson.get_or_init(factor).clone()
     }
 

@@ -26,6 +26,11 @@ impl Scales {
         }
     }
 
+    /// rho: the displacement of a uniform growth by 100 %.
+    pub(super) fn size(&self) -> f64 {
+        self.gyration
+    }
+
     /// For rotation vectors: a turn by a small angle about a random axis displaces by
     /// rho sqrt(2/3) times the angle.
     pub(super) fn rotation(&self) -> f64 {
