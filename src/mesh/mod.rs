@@ -4,6 +4,7 @@
 mod bounds;
 mod components;
 mod corners;
+pub mod dihedral;
 mod edges;
 mod gradients;
 mod hinges;

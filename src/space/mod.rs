@@ -12,10 +12,12 @@
 //!   over all vertices of their squared displacements: see [`Block`].
 
 mod gradients;
+mod lengths_angles;
 mod lri;
 mod orientation;
 mod patch_lri;
 mod placement;
+mod refine;
 mod registry;
 mod scales;
 mod sequence;
@@ -25,6 +27,7 @@ use std::fmt;
 use std::ops::Range;
 
 pub use gradients::Gradients;
+pub use lengths_angles::LengthsAngles;
 pub use lri::Lri;
 pub use patch_lri::PatchLri;
 pub use registry::{SPACES, SpaceKind, Spaces, State};
@@ -131,7 +134,7 @@ pub trait ShapeSpace: Send + Sync {
     fn state(&self) -> State;
 
     /// Coordinates of a shape, scaled by their weights. What has several branches (the logarithm of a
-    /// rotation, an angle) takes the principal one.
+    /// rotation, an angle) takes the principal one, or the one nearest the reference pose's.
     ///
     /// # Panics
     /// `positions` is not 3V or `coordinates` not d long.

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use super::{Block, Gradients, Lri, PatchLri, ShapeSpace, SpaceError, Vertices};
+use super::{Block, Gradients, LengthsAngles, Lri, PatchLri, ShapeSpace, SpaceError, Vertices};
 use crate::mesh::{
     Hinges, Poisson, PoissonAnalysis, ReferenceTriangle, Topology, reference_triangles,
 };
@@ -47,6 +47,18 @@ pub const SPACES: &[SpaceKind] = &[
         summary: "rotations relative to patches, patches to each other: for the largest motions",
         build: patch_lri,
     },
+    SpaceKind {
+        name: "lengths-angles",
+        summary: "edge lengths and dihedral angles: for blends that keep lengths and folds",
+        build: |spaces, _, _| {
+            let (poisson, hinges) = (spaces.poisson()?, spaces.hinges()?);
+            Ok(Arc::new(LengthsAngles::new(
+                poisson,
+                spaces.reference(),
+                hinges,
+            )?))
+        },
+    },
 ];
 
 fn lri(
@@ -54,8 +66,9 @@ fn lri(
     _: &[&[f64]],
     _: Option<&State>,
 ) -> Result<Arc<dyn ShapeSpace>, SpaceError> {
+    let analysis = spaces.analysis()?;
     Ok(Arc::new(Lri::new(
-        &spaces.analysis()?,
+        &analysis,
         spaces.reference(),
         spaces.rest(),
         spaces.hinges()?,

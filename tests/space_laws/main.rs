@@ -98,7 +98,7 @@ fn decode_undoes_encode_at_any_scale_and_far_from_the_origin() {
 #[test]
 fn decode_undoes_encode_on_real_captures() {
     for folder in captures::folders() {
-        check_round_trip(&captures::read(&folder, 2));
+        check_round_trip(&captures::read(&folder, 1));
     }
 }
 
