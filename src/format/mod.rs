@@ -43,6 +43,8 @@ pub enum Kind {
     Cache(&'static dyn CacheFormat),
     /// A scene that moves: frames with faces, read only.
     Scene(&'static dyn SceneFormat),
+    /// A loom: [`loom::read`], [`loom::write`].
+    Loom,
 }
 
 /// All formats.
@@ -76,6 +78,12 @@ pub const FORMATS: &[Format] = &[
         endings: &["glb", "gltf"],
         recognises: |head| head.starts_with(b"glTF"),
         kind: Kind::Scene(&gltf::Gltf),
+    },
+    Format {
+        name: "loom",
+        endings: &["loom"],
+        recognises: loom::recognises,
+        kind: Kind::Loom,
     },
 ];
 

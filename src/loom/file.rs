@@ -87,6 +87,8 @@ struct Metadata {
     warps: usize,
     root: Option<String>,
     #[serde(default)]
+    normals: bool,
+    #[serde(default)]
     groups: Vec<(String, String, usize)>,
     #[serde(default)]
     material_libraries: Vec<String>,
@@ -143,6 +145,7 @@ fn metadata(loom: &Loom) -> String {
         vertices: loom.topology().vertices(),
         warps: loom.time().warps().len(),
         root: loom.root().and_then(root_name),
+        normals: attributes.normals,
         groups: attributes.groups.iter().map(named).collect(),
         material_libraries: attributes.material_libraries.clone(),
         report: loom.report().as_ref().clone(),
@@ -442,7 +445,10 @@ impl Reader {
     fn topology(&mut self, metadata: &Metadata) -> Result<Topology> {
         let arities = self.u32("faces/arities")?;
         let corners = self.u32("faces/corners")?;
-        let mut attributes = Attributes::default();
+        let mut attributes = Attributes {
+            normals: metadata.normals,
+            ..Attributes::default()
+        };
         if self.shape("texture/coordinates").is_some() {
             let tensor = self.take("texture/coordinates")?;
             let TensorData::F32(uv) = tensor.data else {

@@ -81,6 +81,8 @@ pub struct Attributes {
     /// For every corner of every face the texture coordinate it uses; empty when no face has any,
     /// `u32::MAX` at a corner without.
     pub corner_texture: Vec<u32>,
+    /// Whether it had normals: they are computed anew for every frame that is written.
+    pub normals: bool,
     /// Names in the order of the file.
     pub groups: Vec<Group>,
     /// Material libraries (`mtllib`).

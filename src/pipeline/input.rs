@@ -103,7 +103,23 @@ pub(super) struct Files {
     pub(super) mesh: Option<PathBuf>,
     /// The animation of a scene: `FILE#NAME`.
     pub(super) animation: Option<String>,
-    pub(super) warnings: Vec<Diagnostic>,
+}
+
+impl Files {
+    /// The file of a format that holds a whole capture in one.
+    pub(super) fn only(&self) -> Result<&PathBuf> {
+        match self.paths.as_slice() {
+            [path] => Ok(path),
+            paths => Diagnostic::error(format!(
+                "one {} file is a capture, here are {}",
+                self.format.name,
+                paths.len()
+            ))
+            .in_file(&paths[1])
+            .hint("choose one of them")
+            .err(),
+        }
+    }
 }
 
 /// Finds the files that `spec` stands for.
@@ -174,13 +190,11 @@ fn listed(mut paths: Vec<PathBuf>) -> Result<Files> {
         .hint("a capture has files of one format")
         .err();
     }
-    let warnings = gaps(&paths);
     Ok(Files {
         paths,
         format,
         mesh,
         animation: None,
-        warnings,
     })
 }
 
@@ -195,14 +209,10 @@ fn mesh_beside_cache(formats: &[&Format]) -> Option<usize> {
 
 /// The format that the ending of `path` names.
 pub(super) fn format_of(path: &Path) -> Result<&'static Format> {
-    let ending = path
-        .extension()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .into_owned();
-    if let Some(format) = format::by_ending(&ending) {
+    if let Some(format) = known_format(path) {
         return Ok(format);
     }
+    let ending = path.extension().unwrap_or_default().to_string_lossy();
     let unknown = Diagnostic::error(
         match NOT_YET
             .iter()
@@ -214,6 +224,10 @@ pub(super) fn format_of(path: &Path) -> Result<&'static Format> {
         },
     );
     unknown.in_file(path).hint(endings()).err()
+}
+
+fn known_format(path: &Path) -> Option<&'static Format> {
+    format::by_ending(&path.extension()?.to_string_lossy())
 }
 
 fn endings() -> String {
@@ -262,7 +276,7 @@ fn in_folder(world: &dyn World, folder: &Path) -> Result<Files> {
         .into_iter()
         .filter(|entry| !entry.folder && !entry.name.to_string_lossy().starts_with('.'))
         .map(|entry| folder.join(entry.name))
-        .filter(|path| format_of(path).is_ok())
+        .filter(|path| known_format(path).is_some())
         .collect();
     if paths.is_empty() {
         return Diagnostic::error("no capture in this folder")
@@ -271,7 +285,7 @@ fn in_folder(world: &dyn World, folder: &Path) -> Result<Files> {
             .err();
     }
     sort(&mut paths);
-    let formats: Vec<&Format> = paths.iter().flat_map(|path| format_of(path)).collect();
+    let formats: Vec<&Format> = paths.iter().filter_map(|path| known_format(path)).collect();
     let groups = groups(&paths);
     let several = groups.len() > 1 && groups.values().any(|group| group.len() > 1);
     let mixed = formats.iter().any(|format| format.name != formats[0].name);
@@ -419,7 +433,7 @@ fn number(name: &str) -> Option<Range<usize>> {
 }
 
 /// Warnings where the numbers of a sequence break its own stride.
-fn gaps(paths: &[PathBuf]) -> Vec<Diagnostic> {
+pub(super) fn gaps(paths: &[PathBuf]) -> Vec<Diagnostic> {
     let numbers: Option<Vec<u64>> = paths
         .iter()
         .map(|path| {

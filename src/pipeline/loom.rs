@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::input::InputSpec;
+use super::input::{Files, InputSpec};
 use super::open::{Capture, Content, Origin, in_file, no_mesh};
 use super::output::{Output, refuse_inputs};
 use super::save::Saved;
@@ -29,11 +29,12 @@ pub fn open_loom(world: &dyn World, path: &Path, task: &Task) -> Result<Loom> {
 /// A `.loom` file as the frames of its capture.
 pub(super) fn open_as_frames(
     world: &dyn World,
-    path: &Path,
     spec: &InputSpec,
+    files: &Files,
     task: &Task,
 ) -> Result<Capture> {
     no_mesh(spec)?;
+    let path = files.only()?;
     let loom = open_loom(world, path, task)?;
     let part = spec.range.unwrap_or_default().within(loom.frames())?;
     let sampling = Sampling {
@@ -45,7 +46,7 @@ pub(super) fn open_as_frames(
         content: Content::Loom(Arc::new(Sampled::new(loom, sampling))),
         origin: Origin {
             format: "loom",
-            files: vec![path.to_path_buf()],
+            files: vec![path.clone()],
             bytes,
         },
     })

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::input::{self, Files, InputSpec};
 use super::lanes;
-use super::loom::{is_loom, open_as_frames};
+use super::loom::open_as_frames;
 use crate::diag::{Diagnostic, Result, Warned};
 use crate::format::cache::CacheSource;
 use crate::format::{self, CacheFormat, FirstFrame, Kind, MeshFormat, SceneFormat};
@@ -50,24 +50,22 @@ pub struct Origin {
 /// Nothing is there, what is there cannot be told apart, a file is damaged, or the frames do not share
 /// one connectivity. Cancellation.
 pub fn open(world: &dyn World, spec: &InputSpec, task: &Task) -> Result<Warned<Capture>> {
-    if let [path] = spec.paths.as_slice()
-        && is_loom(path)
-    {
-        return open_as_frames(world, path, spec, task).map(Warned::clean);
-    }
-    let mut files = input::find(world, spec)?;
-    let (sequence, origin) = match files.format.kind {
+    let files = input::find(world, spec)?;
+    let mut warnings = Vec::new();
+    let read = match files.format.kind {
         Kind::Mesh(format) => read_meshes(world, spec, &files, format, task)?,
         Kind::Cache(format) => read_cache(world, spec, &files, format, task)?,
-        Kind::Scene(format) => read_scene(world, spec, &mut files, format, task)?,
+        Kind::Scene(format) => read_scene(world, spec, &files, format, task)?,
+        Kind::Loom => return open_as_frames(world, spec, &files, task).map(Warned::clean),
     };
+    let (sequence, origin) = read.unpack(&mut warnings);
     let fps = spec.fps.or(sequence.fps());
     Ok(Warned {
         output: Capture {
             content: Content::Sequence(sequence.with_fps(fps)),
             origin,
         },
-        warnings: files.warnings,
+        warnings,
     })
 }
 
@@ -78,7 +76,7 @@ fn read_meshes(
     files: &Files,
     format: &dyn MeshFormat,
     task: &Task,
-) -> Result<(Sequence, Origin)> {
+) -> Result<Warned<(Sequence, Origin)>> {
     no_mesh(spec)?;
     let range = spec.range.unwrap_or_default().within(files.paths.len())?;
     let paths = &files.paths[range];
@@ -105,7 +103,11 @@ fn read_meshes(
         files: paths.to_vec(),
         bytes,
     };
-    Ok((Sequence::new(first.topology, positions, first.fps), origin))
+    let sequence = Sequence::new(first.topology, positions, first.fps);
+    Ok(Warned {
+        output: (sequence, origin),
+        warnings: input::gaps(paths),
+    })
 }
 
 /// One cache with the faces of a mesh.
@@ -115,13 +117,8 @@ fn read_cache(
     files: &Files,
     format: &dyn CacheFormat,
     task: &Task,
-) -> Result<(Sequence, Origin)> {
-    let [path] = files.paths.as_slice() else {
-        return Diagnostic::error("several caches are not one capture")
-            .in_file(&files.paths[1])
-            .hint("choose one of them")
-            .err();
-    };
+) -> Result<Warned<(Sequence, Origin)>> {
+    let path = files.only()?;
     let Some(mesh) = spec.mesh.as_ref().or(files.mesh.as_ref()) else {
         return Diagnostic::error(format!("a {} cache has no faces", files.format.name))
             .in_file(path)
@@ -166,24 +163,20 @@ fn read_cache(
         files: vec![path.clone(), mesh.clone()],
         bytes: source.length,
     };
-    Ok((Sequence::new(base.topology, positions, header.fps), origin))
+    let sequence = Sequence::new(base.topology, positions, header.fps);
+    Ok(Warned::clean((sequence, origin)))
 }
 
 /// One animation of a scene.
 fn read_scene(
     world: &dyn World,
     spec: &InputSpec,
-    files: &mut Files,
+    files: &Files,
     format: &dyn SceneFormat,
     task: &Task,
-) -> Result<(Sequence, Origin)> {
+) -> Result<Warned<(Sequence, Origin)>> {
     no_mesh(spec)?;
-    let [path] = files.paths.as_slice() else {
-        return Diagnostic::error("several scenes are not one capture")
-            .in_file(&files.paths[1])
-            .hint("choose one of them")
-            .err();
-    };
+    let path = files.only()?;
     task.phase("load", 1);
     let bytes = world.read(path)?;
     let resource = |name: &str| world.read(&input::parent(path).join(name));
@@ -193,9 +186,7 @@ fn read_scene(
         None => in_file(error, path, &bytes),
     })?;
     let warnings = read.warnings.into_iter();
-    files
-        .warnings
-        .extend(warnings.map(|warning| warning.in_file(path)));
+    let warnings = warnings.map(|warning| warning.in_file(path)).collect();
     let sequence = read.output;
     let range = spec.range.unwrap_or_default().within(sequence.frames())?;
     for frame in range.clone() {
@@ -206,7 +197,10 @@ fn read_scene(
         files: vec![path.clone()],
         bytes: bytes.len() as u64,
     };
-    Ok((sequence.slice(range), origin))
+    Ok(Warned {
+        output: (sequence.slice(range), origin),
+        warnings,
+    })
 }
 
 /// Refuses a mesh for files that have faces.

@@ -1,6 +1,7 @@
 //! What OUT stands for: one file, or one file a frame in a folder or by a pattern; and what would be
 //! written, replaced and removed there.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use super::input::{format_of, parent};
@@ -96,14 +97,21 @@ pub(super) fn refuse_inputs<'a>(
     paths: impl IntoIterator<Item = &'a PathBuf>,
     inputs: &[PathBuf],
 ) -> Result<()> {
+    let mut nodes = HashSet::new();
+    for input in inputs {
+        nodes.extend(world.identity(input)?.and_then(|found| found.node));
+    }
+    let named: HashSet<&PathBuf> = inputs.iter().collect();
     for path in paths {
-        for input in inputs {
-            if same_file(world, path, input)? {
-                return Diagnostic::error("the output would replace an input")
-                    .in_file(path)
-                    .hint("choose another output")
-                    .err();
-            }
+        let node = match inputs {
+            [] => None,
+            _ => world.identity(path)?.and_then(|found| found.node),
+        };
+        if named.contains(path) || node.is_some_and(|node| nodes.contains(&node)) {
+            return Diagnostic::error("the output would replace an input")
+                .in_file(path)
+                .hint("choose another output")
+                .err();
         }
     }
     Ok(())
@@ -141,7 +149,7 @@ fn plan_writes(world: &dyn World, out: &Path, frames: usize) -> Result<Plan> {
 
 fn one_file(out: &Path, frames: usize) -> Result<Plan> {
     let format = format_of(out)?;
-    if matches!(format.kind, Kind::Scene(_)) {
+    if matches!(format.kind, Kind::Scene(_) | Kind::Loom) {
         return not_written(format, out).err();
     }
     if frames != 1 && matches!(format.kind, Kind::Mesh(_)) {
@@ -167,11 +175,19 @@ fn one_file(out: &Path, frames: usize) -> Result<Plan> {
     })
 }
 
-/// What is said of a format that is read only.
+/// What is said of a format that frames are not written to.
 pub(super) fn not_written(format: &Format, out: &Path) -> Diagnostic {
-    Diagnostic::error(format!("{} files cannot be written yet", format.name))
-        .in_file(out)
-        .hint("write .pc2, .mdd, or a file a frame: frame_####.obj")
+    let (message, hint) = match format.kind {
+        Kind::Loom => (
+            "frames are not a loom".to_string(),
+            "fit them: `meshloom fit INPUT -o F.loom`",
+        ),
+        _ => (
+            format!("{} files cannot be written yet", format.name),
+            "write .pc2, .mdd, or a file a frame: frame_####.obj",
+        ),
+    };
+    Diagnostic::error(message).in_file(out).hint(hint)
 }
 
 /// An existing folder, a name that ends in a separator, or one without an ending.
@@ -181,22 +197,6 @@ fn is_folder(world: &dyn World, out: &Path) -> Result<bool> {
         .to_string_lossy()
         .ends_with(['/', std::path::MAIN_SEPARATOR]);
     Ok(exists || named || out.extension().is_none())
-}
-
-fn same_file(world: &dyn World, a: &Path, b: &Path) -> Result<bool> {
-    if a == b {
-        return Ok(true);
-    }
-    if a.file_name() != b.file_name() && !may_be_linked(world, a)? {
-        return Ok(false);
-    }
-    let (a, b) = (world.identity(a)?, world.identity(b)?);
-    Ok(a.zip(b)
-        .is_some_and(|(a, b)| a.node.is_some() && a.node == b.node))
-}
-
-fn may_be_linked(world: &dyn World, path: &Path) -> Result<bool> {
-    Ok(world.identity(path)?.is_some())
 }
 
 /// Numbered files: `frame_####.obj` or `frame_%04d.obj`.

@@ -52,7 +52,7 @@ pub fn save(
             write_meshes(&*stage, source, &*writer, task)?;
         }
         Kind::Cache(format) => write_cache(&*stage, source, format, task)?,
-        Kind::Scene(_) => return not_written(plan.format.0, &output.path).err(),
+        Kind::Scene(_) | Kind::Loom => return not_written(plan.format.0, &output.path).err(),
     }
     task.check()?;
     let names = (0..plan.writes.len()).map(|file| file.to_string());

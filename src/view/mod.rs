@@ -6,7 +6,6 @@
 
 mod camera;
 mod heat;
-mod normals;
 mod raster;
 mod shade;
 
@@ -15,6 +14,7 @@ pub use heat::heat_colours;
 pub use shade::{Style, Wire};
 
 use crate::image::Image;
+use crate::mesh::vertex_normals;
 use raster::Raster;
 
 /// What is drawn: triangles over positions, both as [`Topology`](crate::mesh::Topology) and
@@ -83,7 +83,7 @@ impl Renderer {
         image: &mut Image,
     ) {
         let eye = camera.eye(image.width, image.height);
-        normals::smooth(surface, &mut self.normals);
+        vertex_normals(surface.triangles, surface.positions, &mut self.normals);
         self.raster.draw(surface, &eye, image.width, image.height);
         shade::resolve(surface, &self.normals, &self.raster, &eye, style, image);
     }

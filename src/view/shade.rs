@@ -2,9 +2,9 @@
 
 use super::Surface;
 use super::camera::Eye;
-use super::normals::unit;
 use super::raster::{Raster, Sample};
 use crate::image::{Image, blend};
+use crate::mesh::unit_vector as unit;
 
 /// Lines along the triangles' edges.
 #[derive(Debug, Clone, Copy, PartialEq)]

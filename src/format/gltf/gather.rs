@@ -305,6 +305,7 @@ impl Faces {
                 self.attributes.texture_coordinates.extend(pairs);
             }
         }
+        self.attributes.normals |= primitive.get(&Semantic::Normals).is_some();
         let number = |&vertex: &u32| welded[vertex as usize];
         self.corners.extend(corners.iter().map(number));
         let texture = corners.iter().map(|&vertex| match textured {

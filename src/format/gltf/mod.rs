@@ -19,6 +19,7 @@ use std::sync::Arc;
 
 use ::gltf as crates_gltf;
 use crates_gltf::Document;
+use crates_gltf::json::validation::Checked;
 use rayon::prelude::*;
 
 use super::{SceneFormat, nothing_in_it};
@@ -42,10 +43,8 @@ impl SceneFormat for Gltf {
         if bytes.is_empty() {
             return nothing_in_it().err();
         }
-        let parsed = parse(bytes)?;
-        let document = parsed.document;
-        check_channels(&document)?;
-        let buffers = Buffers::load(&document, parsed.blob, resource)?;
+        let (document, blob) = parse(bytes)?;
+        let buffers = Buffers::load(&document, blob, resource)?;
         let hierarchy = Hierarchy::new(&document)?;
         let (chosen, warnings) = choose(&document, animation)?;
         let tracks = match chosen {
@@ -58,7 +57,8 @@ impl SceneFormat for Gltf {
     }
 }
 
-fn parse(bytes: &[u8]) -> Result<crates_gltf::Gltf> {
+/// The crate's validation is run after what it takes for granted: see [`prepare`].
+fn parse(bytes: &[u8]) -> Result<(Document, Option<Vec<u8>>)> {
     // the length in the header of a GLB counts the header
     let short = bytes.starts_with(b"glTF")
         && bytes
@@ -67,30 +67,42 @@ fn parse(bytes: &[u8]) -> Result<crates_gltf::Gltf> {
     if short {
         return damaged("the header of the GLB is too short").err();
     }
-    crates_gltf::Gltf::from_slice(bytes).map_err(|error| {
-        let reason = error.to_string();
-        Box::new(damaged(&reason))
-    })
+    let failed = |error: crates_gltf::Error| Box::new(damaged(&error.to_string()));
+    let parsed = crates_gltf::Gltf::from_slice_without_validation(bytes).map_err(failed)?;
+    let mut root = parsed.document.into_json();
+    prepare(&mut root)?;
+    let document = Document::from_json(root).map_err(failed)?;
+    Ok((document, parsed.blob))
 }
 
-fn damaged(reason: &str) -> Diagnostic {
-    Diagnostic::error(format!("not a whole glTF file: {reason}"))
-        .hint("the file is cut short, damaged, or needs an extension that is not known")
-}
-
-/// What the validation of the crate leaves out.
-fn check_channels(document: &Document) -> Result<()> {
-    let root = document.as_json();
+/// Refuses places that the validation would look up without a check, and gives positions the bounds
+/// that it insists on and nothing here needs.
+fn prepare(root: &mut crates_gltf::json::Root) -> Result<()> {
+    let origin = || Some(serde_json::json!([0.0, 0.0, 0.0]));
+    let primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
+    for primitive in primitives {
+        let positions = crates_gltf::Semantic::Positions;
+        let Some(index) = primitive.attributes.get(&Checked::Valid(positions)) else {
+            continue;
+        };
+        let Some(accessor) = root.accessors.get_mut(index.value()) else {
+            return damaged("positions that are not there").err();
+        };
+        accessor.min = accessor.min.take().or_else(origin);
+        accessor.max = accessor.max.take().or_else(origin);
+    }
     for channel in root.animations.iter().flat_map(|one| &one.channels) {
-        let known = matches!(
-            channel.target.path,
-            crates_gltf::json::validation::Checked::Valid(_)
-        );
+        let known = matches!(channel.target.path, Checked::Valid(_));
         if !known || channel.target.node.value() >= root.nodes.len() {
             return damaged("an animation moves what is not there").err();
         }
     }
     Ok(())
+}
+
+fn damaged(reason: &str) -> Diagnostic {
+    Diagnostic::error(format!("not a whole glTF file: {reason}"))
+        .hint("the file is cut short, damaged, or needs an extension that is not known")
 }
 
 /// The animation of this name, or the first, with a warning if there are others.

@@ -85,7 +85,10 @@ impl Scan {
         match words.next() {
             Some(b"v") => self.vertex(words),
             Some(b"vt") => self.texture(words),
-            Some(b"vn") => Ok(()),
+            Some(b"vn") => {
+                self.attributes.normals = true;
+                Ok(())
+            }
             Some(b"f") => self.face(words, line),
             Some(b"o") => self.group(GroupKind::Object, text),
             Some(b"g") => self.group(GroupKind::Group, text),

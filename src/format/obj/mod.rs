@@ -1,9 +1,10 @@
 //! Wavefront OBJ. Vertices keep the order of the file, polygons stay polygons; texture coordinates,
 //! objects, groups, materials and smoothing of the first frame are kept and written again.
 //!
-//! Read are `v` (x y z; a weight or a colour after them is dropped), `vt`, `f`, `o`, `g`, `usemtl`, `s`,
-//! `mtllib` and a comment `# fps 24`; other statements (normals, lines, curves) are passed over. A number
-//! of frames per second is written as that comment.
+//! Read are `v` (x y z; a weight or a colour after them is dropped), `vt`, `vn` (only that there are
+//! normals: they are computed anew for every frame that is written), `f`, `o`, `g`, `usemtl`, `s`,
+//! `mtllib` and a comment `# fps 24`; other statements (lines, curves) are passed over. A number of
+//! frames per second is written as that comment.
 
 mod first;
 mod next;

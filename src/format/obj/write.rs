@@ -5,10 +5,11 @@ use std::io::Write;
 use std::sync::Arc;
 
 use crate::format::{FrameWriter, shortest};
-use crate::mesh::{GroupKind, Topology};
+use crate::mesh::{GroupKind, Topology, vertex_normals};
 
 /// Writes frames of one connectivity.
 pub(super) struct ObjWriter {
+    topology: Arc<Topology>,
     head: Vec<u8>,
     tail: Vec<u8>,
 }
@@ -16,6 +17,7 @@ pub(super) struct ObjWriter {
 impl ObjWriter {
     pub(super) fn new(topology: &Arc<Topology>, fps: Option<f64>) -> Self {
         ObjWriter {
+            topology: Arc::clone(topology),
             head: head(topology, fps),
             tail: tail(topology),
         }
@@ -37,7 +39,26 @@ impl FrameWriter for ObjWriter {
             }
             out.push(b'\n');
         }
+        if self.topology.attributes().normals {
+            normals(&self.topology, positions, out);
+        }
         out.extend_from_slice(&self.tail);
+    }
+}
+
+/// One `vn` a vertex, to six decimals.
+fn normals(topology: &Topology, positions: &[f32], out: &mut Vec<u8>) {
+    let mut normals = Vec::new();
+    let mut digits = zmij::Buffer::new();
+    vertex_normals(topology.triangles(), positions, &mut normals);
+    for normal in normals {
+        out.extend_from_slice(b"vn");
+        for value in normal {
+            out.push(b' ');
+            let value = (value * 1e6).round() / 1e6;
+            out.extend_from_slice(shortest(&mut digits, value));
+        }
+        out.push(b'\n');
     }
 }
 
@@ -68,11 +89,14 @@ fn tail(topology: &Topology) -> Vec<u8> {
         tail.push(b'f');
         for &vertex in polygon {
             let _ = write!(tail, " {}", u64::from(vertex) + 1);
-            match attributes.corner_texture.get(corner) {
-                Some(&texture) if texture != u32::MAX => {
-                    let _ = write!(tail, "/{}", u64::from(texture) + 1);
-                }
-                _ => {}
+            let texture = attributes.corner_texture.get(corner);
+            let texture = texture.filter(|texture| **texture != u32::MAX);
+            if let Some(&texture) = texture {
+                let _ = write!(tail, "/{}", u64::from(texture) + 1);
+            }
+            if attributes.normals {
+                let between = if texture.is_some() { "/" } else { "//" };
+                let _ = write!(tail, "{between}{}", u64::from(vertex) + 1);
             }
             corner += 1;
         }

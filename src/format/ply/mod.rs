@@ -1,9 +1,10 @@
 //! PLY, ascii and binary, little and big endian.
 //!
 //! Read are the elements `vertex` (x y z of any type; texture coordinates `s t`, `u v` or
-//! `texture_u texture_v`) and `face` (the list `vertex_indices` or `vertex_index`; the list `texcoord`);
+//! `texture_u texture_v`; of normals only that they are there) and `face` (the list `vertex_indices` or `vertex_index`; the list `texcoord`);
 //! other elements and properties are passed over. A comment `fps 24` gives the frames per second.
-//! Written are f32 coordinates, in binary little endian unless asked otherwise.
+//! Written are f32 coordinates, in binary little endian unless asked otherwise; normals anew for every
+//! frame if the first one read had any.
 
 mod header;
 mod read;

@@ -27,7 +27,8 @@ pub(super) fn first(bytes: &[u8], name: &str) -> Result<FirstFrame> {
         let told = Diagnostic::error(error.to_string());
         Box::new(told.hint("PLY counts from 0, this message from 1"))
     })?;
-    let attributes = attributes(&topology, first.vertex_texture, first.corner_texture);
+    let mut attributes = attributes(&topology, first.vertex_texture, first.corner_texture);
+    attributes.normals = has_normals(&header);
     Ok(FirstFrame {
         name: name.to_string(),
         topology: Arc::new(topology.with_attributes(attributes)),
@@ -67,6 +68,11 @@ fn no_faces(header: &Header) -> &'static str {
     } else {
         "no faces"
     }
+}
+
+fn has_normals(header: &Header) -> bool {
+    let vertex = header.elements.iter().find(|one| one.name == "vertex");
+    vertex.is_some_and(|element| element.property(&["nx"]).is_some())
 }
 
 /// Whatever must be equal for equal bytes to mean equal faces.

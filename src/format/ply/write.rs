@@ -4,10 +4,11 @@ use std::io::Write;
 use std::sync::Arc;
 
 use crate::format::{Encoding, FrameWriter, WriteOptions, shortest};
-use crate::mesh::Topology;
+use crate::mesh::{Topology, vertex_normals};
 
 /// Writes frames of one connectivity.
 pub(super) struct PlyWriter {
+    topology: Arc<Topology>,
     encoding: Encoding,
     head: Vec<u8>,
     /// Texture coordinates s t of each vertex; empty if there are none or a vertex has several.
@@ -28,6 +29,7 @@ impl PlyWriter {
             wide: 2 * longest > usize::from(u8::MAX),
         };
         PlyWriter {
+            topology: Arc::clone(topology),
             encoding: options.encoding,
             head: head(topology, options, &shape),
             texture,
@@ -46,9 +48,18 @@ impl FrameWriter for PlyWriter {
         };
         out.reserve(self.head.len() + self.tail.len() + digits * positions.len());
         out.extend_from_slice(&self.head);
+        let mut normals = Vec::new();
+        if self.topology.attributes().normals {
+            vertex_normals(self.topology.triangles(), positions, &mut normals);
+        }
         for (vertex, point) in positions.chunks_exact(3).enumerate() {
+            let normal = normals.get(vertex).map_or(&[][..], |normal| &normal[..]);
             let texture = self.texture.get(vertex).map_or(&[][..], |pair| &pair[..]);
-            floats(out, self.encoding, point.iter().chain(texture));
+            floats(
+                out,
+                self.encoding,
+                point.iter().chain(normal).chain(texture),
+            );
             end_line(out, self.encoding);
         }
         out.extend_from_slice(&self.tail);
@@ -92,12 +103,10 @@ fn head(topology: &Topology, options: WriteOptions, shape: &Shape) -> Vec<u8> {
         head += &format!("comment fps {fps}\n");
     }
     head += &format!("element vertex {}\n", topology.vertices());
-    let texture: &[&str] = if shape.vertex_texture {
-        &["s", "t"]
-    } else {
-        &[]
-    };
-    for name in ["x", "y", "z"].iter().chain(texture) {
+    let given = |yes: bool, names: &'static [&str]| if yes { names } else { &[] };
+    let normals = given(topology.attributes().normals, &["nx", "ny", "nz"]);
+    let texture = given(shape.vertex_texture, &["s", "t"]);
+    for name in ["x", "y", "z"].iter().chain(normals).chain(texture) {
         head += &format!("property float {name}\n");
     }
     let count = if shape.wide { "uint" } else { "uchar" };
