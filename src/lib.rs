@@ -44,3 +44,4 @@ pub mod inbox;
 pub mod io;
 pub mod pipeline;
 pub mod recipe;
+pub mod tui;

@@ -133,6 +133,11 @@ impl Sampled {
         Sampled::new(loom, Sampling { times, fps })
     }
 
+    /// The loom that is sampled.
+    pub fn loom(&self) -> &Loom {
+        &self.loom
+    }
+
     /// The time of every frame.
     pub fn times(&self) -> &[f64] {
         &self.sampling.times

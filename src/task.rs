@@ -40,6 +40,11 @@ impl Task {
         self
     }
 
+    /// The flag that cancels this task, for another task that is to share it.
+    pub fn flag(&self) -> Arc<AtomicBool> {
+        Arc::clone(&self.cancel)
+    }
+
     /// Asks the work to stop; it ends with [`Cancelled`] at its next check.
     pub fn cancel(&self) {
         self.cancel.store(true, Ordering::Relaxed);

@@ -20,6 +20,7 @@ mod doctor;
 mod fit;
 mod info;
 mod man;
+mod open;
 mod plot;
 mod sample;
 
@@ -55,6 +56,7 @@ commands! {
     demo Demo,
     fit Fit,
     sample Sample,
+    open Open,
     compare Compare,
     info Info,
     convert Convert,

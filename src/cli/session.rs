@@ -18,6 +18,7 @@ use crate::io::{Disk, abandon_stages};
 use crate::loom::Loom;
 use crate::pipeline::{self, Capture, InputSpec};
 use crate::task::{Observer, Task};
+use crate::tui;
 use crate::world::World;
 
 /// One run of the command: its task, its threads, its way of speaking.
@@ -53,6 +54,7 @@ impl Session {
         let last_word = LastWord::default();
         let bar = Arc::clone(&progress);
         let clean_up = move || {
+            tui::restore();
             bar.end();
             abandon_stages();
         };

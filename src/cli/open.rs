@@ -1,0 +1,163 @@
+//! `meshloom open INPUT`: the studio.
+
+use std::io::{self, IsTerminal};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::args::{Input, positive};
+use super::session::{Outcome, Session};
+use crate::diag::{Diagnostic, Result, Warned};
+use crate::io::Disk;
+use crate::mesh::{FrameSource, Sequence};
+use crate::pipeline::{self, Content, FrameRange, InputSpec, Output};
+use crate::task::Task;
+use crate::tui::{self, Files, Opened, Options, Protocol};
+use crate::world::World;
+
+/// Look at a capture or a loom in the terminal
+///
+/// The capture is shown while it is read, then fitted in the background; a loom is shown at once. The keys
+/// are listed by ?.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    #[command(flatten)]
+    input: Input,
+
+    /// Frames a second, if the capture does not say or says wrong
+    #[arg(long, value_name = "RATE", value_parser = positive)]
+    fps: Option<f64>,
+
+    /// How pictures are shown
+    #[arg(long, value_name = "HOW", value_parser = protocol, default_value = "blocks")]
+    graphics: Protocol,
+}
+
+fn protocol(name: &str) -> Result<Protocol, String> {
+    let known = Protocol::ALL.map(Protocol::name).join(", ");
+    let found = Protocol::ALL
+        .into_iter()
+        .find(|protocol| protocol.name() == name);
+    found.ok_or(format!("there are {known}"))
+}
+
+pub(super) fn run(args: &Args, session: &Session) -> Result<Outcome> {
+    refuse_pipes()?;
+    let spec = args.input.part.of(&args.input.inputs, args.fps);
+    let name = title(&args.input.inputs);
+    let options = options(name.clone(), args.graphics);
+    let files = Arc::new(OnDisk { spec, name });
+    session.progress.end();
+    tui::run(&options, files, &session.task)?;
+    Ok(Outcome::default())
+}
+
+/// The studio needs a keyboard and a screen.
+fn refuse_pipes() -> Result<()> {
+    let name = match (io::stdin().is_terminal(), io::stdout().is_terminal()) {
+        (true, true) => return Ok(()),
+        (false, _) => "stdin",
+        (true, false) => "stdout",
+    };
+    Diagnostic::error(format!("the studio needs a terminal, and {name} is none"))
+        .hint("`meshloom fit INPUT -o OUT.loom` and `meshloom plot OUT.loom -o OUT.png` need none")
+        .err()
+}
+
+fn title(inputs: &[PathBuf]) -> String {
+    let name = |path: &Path| {
+        path.file_name()
+            .unwrap_or(path.as_os_str())
+            .to_string_lossy()
+            .into_owned()
+    };
+    inputs.first().map_or_else(String::new, |path| name(path))
+}
+
+fn options(name: String, graphics: Protocol) -> Options {
+    let variable = |name| std::env::var(name).unwrap_or_default();
+    Options {
+        name,
+        graphics,
+        dark: true,
+        colour: variable("NO_COLOR").is_empty() && variable("TERM") != "dumb",
+        true_colour: matches!(variable("COLORTERM").as_str(), "truecolor" | "24bit"),
+    }
+}
+
+/// The capture on disk, and the working directory for what is written.
+struct OnDisk {
+    spec: InputSpec,
+    name: String,
+}
+
+impl OnDisk {
+    /// The first of `STEM-1ENDING`, `STEM-2ENDING`, .. that is not there yet.
+    fn fresh(&self, stem: &str, ending: &str) -> PathBuf {
+        let named = |number| PathBuf::from(format!("{stem}-{number}{ending}"));
+        let free = |path: &PathBuf| matches!(Disk.identity(path), Ok(None));
+        (1..1000)
+            .map(named)
+            .find(free)
+            .unwrap_or_else(|| named(1000))
+    }
+}
+
+impl Files for OnDisk {
+    fn first(&self, task: &Task) -> Result<Option<Sequence>> {
+        let start = self.spec.range.and_then(|range| range.first).unwrap_or(1);
+        let range = FrameRange {
+            first: Some(start),
+            last: Some(start),
+        };
+        let spec = InputSpec {
+            range: Some(range),
+            ..self.spec.clone()
+        };
+        Ok(match pipeline::open(&Disk, &spec, task)?.output.content {
+            Content::Sequence(sequence) => Some(sequence),
+            Content::Loom(_) => None,
+        })
+    }
+
+    fn open(&self, task: &Task) -> Result<Warned<Opened>> {
+        let capture = pipeline::open(&Disk, &self.spec, task)?;
+        let opened = match &capture.output.content {
+            Content::Sequence(sequence) => Opened::Capture(sequence.clone()),
+            Content::Loom(_) if self.spec.range.is_some() => {
+                return Diagnostic::error("a range is for captures, and this is a loom")
+                    .in_file(&self.spec.paths[0])
+                    .hint("leave --range out, and mark a loop with [ and ]")
+                    .err();
+            }
+            Content::Loom(sampled) => {
+                let loom = sampled.loom();
+                let fps = self.spec.fps.or(loom.fps());
+                Opened::Loom(Arc::new(loom.with_fps(fps)?))
+            }
+        };
+        Ok(capture.map(|_| opened))
+    }
+
+    fn save(&self, name: &str, png: &[u8]) -> Result<PathBuf> {
+        let stem = name.trim_end_matches(".png");
+        let path = self.fresh(&format!("{}-{stem}", stem_of(&self.name)), ".png");
+        let stage = Disk.stage(&path)?;
+        stage.write("picture", png)?;
+        stage.commit(&[("picture".to_string(), path.clone())], &[])?;
+        Ok(path)
+    }
+
+    fn export(&self, frames: &dyn FrameSource, task: &Task) -> Result<PathBuf> {
+        let folder = self.fresh(&format!("{}-frames", stem_of(&self.name)), "");
+        let output = Output::from(folder.join("####.obj")).protecting(&self.spec.paths);
+        pipeline::save(&Disk, frames, &output, task)?;
+        Ok(folder)
+    }
+}
+
+fn stem_of(name: &str) -> &str {
+    name.split('.')
+        .next()
+        .filter(|stem| !stem.is_empty())
+        .unwrap_or("meshloom")
+}

@@ -1,0 +1,27 @@
+//! The studio: a capture as a curve on a map, its signals over time, and the mesh, in a terminal.
+//!
+//! ```text
+//! keys, mouse, size, ticks, answers --Event--> update(State) --Command--> workers, files, the terminal
+//!                                                  |
+//!                                          panels draw State
+//! ```
+//!
+//! **Invariants:** [`update`](update::update) decides and draws nothing; panels draw and change nothing; work longer
+//! than a frame runs on worker threads, and answers to questions that are no longer asked are dropped.
+
+mod event;
+mod graphics;
+mod keys;
+mod layout;
+mod panels;
+mod screen;
+mod state;
+mod studio;
+mod terminal;
+mod theme;
+mod update;
+mod work;
+
+pub use graphics::Protocol;
+pub use studio::{Files, Opened, Options, run};
+pub use terminal::restore;

@@ -1,0 +1,236 @@
+//! The whole screen, drawn from the state.
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::style::Modifier;
+use ratatui::text::{Line, Span};
+use ratatui::widgets::{Block, Clear, Paragraph, Widget};
+
+use super::graphics::{Aside, Painter};
+use super::keys::{self, ACTIONS};
+use super::layout::{inner, tabbed, tabs};
+use super::panels::PANELS;
+use super::state::{Content, Front, State};
+use super::theme::Role;
+
+/// Draws everything.
+pub(super) fn draw(
+    state: &State,
+    painter: &mut dyn Painter,
+    buffer: &mut Buffer,
+    aside: &mut Aside,
+) {
+    let screen = buffer.area;
+    if screen.is_empty() {
+        return;
+    }
+    if tabbed(state.size) && !state.enlarged {
+        draw_tabs(state, buffer);
+    }
+    for (index, area) in state.places() {
+        draw_panel(
+            state,
+            index,
+            area.intersection(screen),
+            painter,
+            buffer,
+            aside,
+        );
+    }
+    draw_status(state, buffer);
+    match &state.front {
+        Some(Front::Help(line)) => draw_help(state, *line, buffer),
+        Some(Front::Palette(typed, chosen)) => draw_palette(state, typed, *chosen, buffer),
+        None => {}
+    }
+}
+
+fn draw_tabs(state: &State, buffer: &mut Buffer) {
+    for (index, column, text) in tabs() {
+        let mut style = state.look.style(Role::Muted);
+        if index == state.focus {
+            style = state
+                .look
+                .style(Role::Accent)
+                .add_modifier(Modifier::REVERSED);
+        }
+        if column < buffer.area.width {
+            buffer.set_string(column, 0, text, style);
+        }
+    }
+}
+
+fn draw_panel(
+    state: &State,
+    index: usize,
+    area: Rect,
+    painter: &mut dyn Painter,
+    buffer: &mut Buffer,
+    aside: &mut Aside,
+) {
+    let role = if index == state.focus {
+        Role::Accent
+    } else {
+        Role::Muted
+    };
+    let panel = PANELS[index];
+    Block::bordered()
+        .title(format!(" {} ", panel.title()))
+        .border_style(state.look.style(role))
+        .render(area, buffer);
+    let inside = inner(area);
+    if inside.is_empty() {
+        return;
+    }
+    if let Some(picture) = &state.slots[index].shown {
+        painter.paint(index, &picture.image, inside, buffer, aside);
+    } else if panel.subject(state).is_none() {
+        let text = waiting(state, index);
+        Paragraph::new(text)
+            .style(state.look.style(Role::Muted))
+            .render(inside, buffer);
+    }
+    panel.draw(state, inside, buffer);
+}
+
+/// What a panel without a picture waits for.
+fn waiting(state: &State, index: usize) -> &'static str {
+    match state.content {
+        _ if index == super::panels::DETAILS => "",
+        _ if state.work.is_none() => "nothing to show",
+        Content::Nothing | Content::FirstFrame(_) => "reading ..",
+        Content::Capture(_) | Content::Loom(..) => "fitting ..",
+    }
+}
+
+/// The last row: what is open, where we are, how well it fits, and what happens.
+fn draw_status(state: &State, buffer: &mut Buffer) {
+    let row = buffer.area.height - 1;
+    let area = Rect::new(0, row, buffer.area.width, 1);
+    let muted = state.look.style(Role::Muted);
+    let playback = &state.playback;
+    let mut spans = vec![
+        Span::styled(
+            if playback.playing { " ▶ " } else { " ∎ " },
+            state.look.style(Role::Accent),
+        ),
+        Span::raw(format!("{} ", state.name)),
+        Span::raw(format!("frame {:.2}/{} ", playback.t, state.frames())),
+        Span::styled(format!("{:.2} s ", (playback.t - 1.0) / state.fps()), muted),
+        Span::styled(
+            format!("{:.4} fps x{} ", Short(state.fps()), playback.speed),
+            muted,
+        ),
+    ];
+    if let Some(loom) = state.loom() {
+        let (k, l) = (loom.time().controls().len(), loom.pose().sites().len());
+        let error = 100.0 * loom.report().error.total;
+        spans.push(Span::raw(format!(
+            "k={k} l={l} m={} ",
+            loom.shape().modes()
+        )));
+        spans.push(Span::styled(format!("error {error:.3} % "), muted));
+    }
+    if let Some((phase, done, steps)) = state.work {
+        let share = if steps > 0 {
+            format!(" {done}/{steps}")
+        } else {
+            String::new()
+        };
+        spans.push(Span::styled(
+            format!("{phase}{share} "),
+            state.look.style(Role::Mark),
+        ));
+    }
+    match &state.notice {
+        Some(notice) => {
+            let role = if notice.bad { Role::Bad } else { Role::Mark };
+            spans.push(Span::styled(notice.text.clone(), state.look.style(role)));
+        }
+        None => spans.push(Span::styled("? keys  q quit", muted)),
+    }
+    Paragraph::new(Line::from(spans)).render(area, buffer);
+}
+
+/// A number without digits that say nothing.
+struct Short(f64);
+
+impl std::fmt::Display for Short {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let text = format!("{:.2}", self.0);
+        f.write_str(text.trim_end_matches('0').trim_end_matches('.'))
+    }
+}
+
+/// A box in the middle of the screen with an empty inside.
+fn front(state: &State, title: &str, size: (u16, u16), buffer: &mut Buffer) -> Rect {
+    let screen = buffer.area;
+    let (width, height) = (size.0.min(screen.width), size.1.min(screen.height));
+    let left = (screen.width - width) / 2;
+    let top = (screen.height - height) / 2;
+    let area = Rect::new(left, top, width, height);
+    Clear.render(area, buffer);
+    Block::bordered()
+        .title(format!(" {title} "))
+        .border_style(state.look.style(Role::Accent))
+        .render(area, buffer);
+    inner(area)
+}
+
+fn binding_line(state: &State, binding: &keys::Binding) -> Line<'static> {
+    let keys = format!("{:>18}  ", binding.keys.join(" "));
+    Line::from_iter([
+        Span::styled(keys, state.look.style(Role::Accent)),
+        Span::raw(binding.about),
+    ])
+}
+
+fn draw_help(state: &State, line: u16, buffer: &mut Buffer) {
+    let height = (ACTIONS.len() + MOUSE.len() + 2) as u16;
+    let inside = front(state, "keys and mouse", (78, height), buffer);
+    let mouse = MOUSE.iter().map(|(what, about)| {
+        Line::from_iter([
+            Span::styled(format!("{what:>18}  "), state.look.style(Role::Mark)),
+            Span::raw(*about),
+        ])
+    });
+    let keys = ACTIONS.iter().map(|binding| binding_line(state, binding));
+    let lines: Vec<Line> = keys.chain(mouse).collect();
+    Paragraph::new(lines)
+        .scroll((line, 0))
+        .render(inside, buffer);
+}
+
+/// What the mouse does, for the help.
+const MOUSE: &[(&str, &str)] = &[
+    ("left, curve", "to that time; drag to scrub"),
+    ("left, map", "the pose there"),
+    ("left, signals", "to that time; drag to scrub"),
+    ("left, mesh", "drag to turn"),
+    ("right, map", "drag to move"),
+    (
+        "wheel",
+        "closer, farther; on the signals a frame on or back",
+    ),
+];
+
+fn draw_palette(state: &State, typed: &str, chosen: usize, buffer: &mut Buffer) {
+    let found = keys::find(typed);
+    let inside = front(state, "find an action", (78, 16), buffer);
+    if inside.height == 0 {
+        return;
+    }
+    let mut lines = vec![Line::raw(format!(": {typed}▏"))];
+    let rows = usize::from(inside.height).saturating_sub(1);
+    let first = (chosen + 1).saturating_sub(rows);
+    for (index, binding) in found.iter().enumerate().skip(first) {
+        let line = binding_line(state, binding);
+        let picked = index == chosen;
+        lines.push(if picked {
+            line.patch_style(Modifier::REVERSED)
+        } else {
+            line
+        });
+    }
+    Paragraph::new(lines).render(inside, buffer);
+}

@@ -1,0 +1,307 @@
+//! What the studio knows.
+
+use std::sync::Arc;
+
+use ratatui::layout::Rect;
+
+use super::graphics::CellSize;
+use super::layout;
+use super::panels::PANELS;
+use super::theme::Look;
+use super::work::{Picture, Wish};
+use crate::loom::Loom;
+use crate::mesh::{Bounds, FrameSource, Sequence};
+use crate::plot::{PoseSpace, TimeSignals};
+
+/// Playback at this rate where the capture has none.
+const DEFAULT_FPS: f64 = 25.0;
+
+/// Everything that is drawn or decided upon.
+#[derive(Debug)]
+pub(super) struct State {
+    /// What is open, as the user named it.
+    pub(super) name: String,
+    /// What has been read of it so far.
+    pub(super) content: Content,
+    /// When in it we are.
+    pub(super) playback: Playback,
+    /// A place off the curve, whose pose is shown instead.
+    pub(super) roaming: Option<[f64; 2]>,
+    /// The part of the map that is shown; none: all.
+    pub(super) window: Option<[[f64; 2]; 2]>,
+    /// How the mesh is looked at.
+    pub(super) mesh: MeshView,
+    /// Columns and rows.
+    pub(super) size: (u16, u16),
+    /// Pixels of a cell in pictures.
+    pub(super) cell: CellSize,
+    /// Colours.
+    pub(super) look: Look,
+    /// Index of the panel that keys speak to.
+    pub(super) focus: usize,
+    /// Whether it fills the screen.
+    pub(super) enlarged: bool,
+    /// What stands in front of the panels.
+    pub(super) front: Option<Front>,
+    /// A word to the user.
+    pub(super) notice: Option<Notice>,
+    /// The work in the background: phase, steps done, and of how many.
+    pub(super) work: Option<(&'static str, usize, usize)>,
+    /// Pictures of the panels.
+    pub(super) slots: Vec<Slot>,
+    /// What the mouse holds.
+    pub(super) drag: Option<Drag>,
+    /// Numbers given to questions so far.
+    pub(super) asked: u64,
+}
+
+/// What has been read.
+#[derive(Debug, Clone, Default)]
+pub(super) enum Content {
+    /// Nothing yet.
+    #[default]
+    Nothing,
+    /// The first frame, while the others are read.
+    FirstFrame(Scene<Sequence>),
+    /// The frames, while a loom is fitted.
+    Capture(Scene<Sequence>),
+    /// The loom, and what its plots show.
+    Loom(Scene<Loom>, Same<Signals>),
+}
+
+/// A loom's series for plots.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Signals {
+    /// The map.
+    pub(super) map: PoseSpace,
+    /// Over time.
+    pub(super) times: TimeSignals,
+}
+
+/// Something to look at and the box around all of it.
+pub(super) struct Scene<T> {
+    /// What is looked at.
+    pub(super) of: Same<T>,
+    /// The box.
+    pub(super) bounds: Bounds,
+}
+
+/// A shared value; two are equal when they are the same one.
+pub(super) struct Same<T>(pub(super) Arc<T>);
+
+impl<T> Same<T> {
+    pub(super) fn new(value: T) -> Self {
+        Same(Arc::new(value))
+    }
+}
+
+impl<T> Clone for Same<T> {
+    fn clone(&self) -> Self {
+        Same(Arc::clone(&self.0))
+    }
+}
+
+impl<T> PartialEq for Same<T> {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+}
+
+impl<T> Clone for Scene<T> {
+    fn clone(&self) -> Self {
+        Scene {
+            of: self.of.clone(),
+            bounds: self.bounds,
+        }
+    }
+}
+
+impl<T> PartialEq for Scene<T> {
+    fn eq(&self, other: &Self) -> bool {
+        self.of == other.of
+    }
+}
+
+impl<T> std::fmt::Debug for Scene<T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.of.fmt(f)
+    }
+}
+
+impl<T> std::fmt::Debug for Same<T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Same({:p})", Arc::as_ptr(&self.0))
+    }
+}
+
+/// When in the capture we are; times in frames, from 1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Playback {
+    /// Now.
+    pub(super) t: f64,
+    /// Whether time passes.
+    pub(super) playing: bool,
+    /// How fast: 1 is the capture's own rate.
+    pub(super) speed: f64,
+    /// Where the loop begins and ends.
+    pub(super) marks: [Option<f64>; 2],
+}
+
+/// A range of times.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Span {
+    pub(super) from: f64,
+    pub(super) to: f64,
+}
+
+/// How the mesh is looked at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct MeshView {
+    pub(super) yaw: f64,
+    pub(super) pitch: f64,
+    /// Of what would show everything.
+    pub(super) zoom: f64,
+    pub(super) wires: bool,
+    pub(super) onion: bool,
+}
+
+/// What stands in front of the panels.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Front {
+    /// The keys, from this line on.
+    Help(u16),
+    /// A search over actions: what was typed, and which of those found is chosen.
+    Palette(String, usize),
+}
+
+/// A word to the user.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Notice {
+    pub(super) text: String,
+    pub(super) bad: bool,
+}
+
+/// The picture of a panel: what is shown, and what was asked for.
+#[derive(Debug, Default)]
+pub(super) struct Slot {
+    pub(super) shown: Option<Arc<Picture>>,
+    /// Number of the question that `shown` answers.
+    pub(super) number: u64,
+    pub(super) asked: Option<Wish>,
+}
+
+/// What the mouse holds, and where it was last.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Drag {
+    /// Index of the panel in which it was pressed.
+    pub(super) panel: usize,
+    pub(super) column: u16,
+    pub(super) row: u16,
+    /// Whether the view is dragged, not the cursor.
+    pub(super) view: bool,
+}
+
+impl State {
+    /// Before anything is read.
+    pub(super) fn new(name: String, size: (u16, u16), cell: CellSize, look: Look) -> Self {
+        State {
+            name,
+            content: Content::Nothing,
+            playback: Playback {
+                t: 1.0,
+                playing: false,
+                speed: 1.0,
+                marks: [None; 2],
+            },
+            roaming: None,
+            window: None,
+            mesh: MeshView::default(),
+            size,
+            cell,
+            look,
+            focus: 0,
+            enlarged: false,
+            front: None,
+            notice: None,
+            work: None,
+            slots: PANELS.iter().map(|_| Slot::default()).collect(),
+            drag: None,
+            asked: 0,
+        }
+    }
+
+    /// n, or 1 before anything is known.
+    pub(super) fn frames(&self) -> usize {
+        match &self.content {
+            Content::Nothing | Content::FirstFrame(_) => 1,
+            Content::Capture(scene) => scene.of.0.frames().max(1),
+            Content::Loom(scene, _) => scene.of.0.frames().max(1),
+        }
+    }
+
+    /// Frames per second for playback.
+    pub(super) fn fps(&self) -> f64 {
+        let known = match &self.content {
+            Content::Nothing => None,
+            Content::FirstFrame(scene) | Content::Capture(scene) => scene.of.0.fps(),
+            Content::Loom(scene, _) => scene.of.0.fps(),
+        };
+        known.unwrap_or(DEFAULT_FPS)
+    }
+
+    /// The loom, once there is one.
+    pub(super) fn loom(&self) -> Option<&Arc<Loom>> {
+        match &self.content {
+            Content::Loom(scene, _) => Some(&scene.of.0),
+            _ => None,
+        }
+    }
+
+    /// The loom's plots, once there is one.
+    pub(super) fn signals(&self) -> Option<&Same<Signals>> {
+        match &self.content {
+            Content::Loom(_, signals) => Some(signals),
+            _ => None,
+        }
+    }
+
+    /// Where the cursor stands on the map: off the curve, or at f(t).
+    pub(super) fn cursor(&self) -> Option<[f64; 2]> {
+        let on_curve = || self.loom()?.position_at(self.playback.t).ok();
+        self.roaming.or_else(on_curve)
+    }
+
+    /// Between the marks, or everything.
+    pub(super) fn span(&self) -> Span {
+        let [from, to] = self.playback.marks;
+        let (from, to) = (from.unwrap_or(1.0), to.unwrap_or(self.frames() as f64));
+        Span {
+            from: from.min(to),
+            to: from.max(to),
+        }
+    }
+
+    /// The panels on the screen and where, borders included.
+    pub(super) fn places(&self) -> Vec<(usize, Rect)> {
+        layout::places(self.size, self.focus, self.enlarged)
+    }
+
+    /// What fits into `area` as a picture, in pixels.
+    pub(super) fn pixels(&self, area: Rect) -> (usize, usize) {
+        let across = usize::from(area.width) * usize::from(self.cell.width);
+        let down = usize::from(area.height) * usize::from(self.cell.height);
+        (across, down)
+    }
+}
+
+impl Default for MeshView {
+    fn default() -> Self {
+        MeshView {
+            yaw: 0.6,
+            pitch: 0.25,
+            zoom: 1.0,
+            wires: false,
+            onion: false,
+        }
+    }
+}

@@ -1,0 +1,434 @@
+//! The loop: events in, the state changes, commands are carried out, the screen is drawn.
+
+use std::io;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
+use std::time::{Duration, Instant};
+
+use ratatui::backend::{Backend, CrosstermBackend};
+use ratatui::buffer::Buffer;
+use ratatui::crossterm::event::{self as keyboard, KeyEventKind};
+use ratatui::crossterm::terminal::size;
+use ratatui::layout::Rect;
+
+use super::event::{Answer, Command, Event};
+use super::graphics::{Aside, Painter, Protocol, cell_size, painter};
+use super::screen;
+use super::state::{Content, Same, Scene, Signals, Span, State};
+use super::terminal;
+use super::theme::{Depth, Look};
+use super::update::update;
+use super::work::{Brush, Mailbox, Wish, start, start_painter};
+use crate::diag::{Diagnostic, Result, Warned};
+use crate::loom::Loom;
+use crate::loom::fit::{FitOptions, fit};
+use crate::mesh::{Bounds, FrameSource, Sequence};
+use crate::pipeline::plot::plot_loom;
+use crate::sample::{Sampled, Sampling};
+use crate::task::{Cancelled, Observer, Task};
+
+/// Between two frames of playback.
+const FRAME: Duration = Duration::from_millis(33);
+/// How often a signal is looked for while no key is pressed: within the grace it gives.
+const WATCH: Duration = Duration::from_millis(25);
+/// A loom's box is taken from so many of its frames.
+const BOUNDS_SAMPLES: usize = 32;
+
+/// What the studio needs of the files. Called on worker threads.
+pub trait Files: Send + Sync {
+    /// The first frame alone, as fast as it can be had; `None` where opening everything is as fast.
+    ///
+    /// # Errors
+    /// It cannot be read.
+    fn first(&self, task: &Task) -> Result<Option<Sequence>>;
+
+    /// Everything.
+    ///
+    /// # Errors
+    /// It cannot be read.
+    fn open(&self, task: &Task) -> Result<Warned<Opened>>;
+
+    /// Writes a picture to a PNG file of that name and says where it is.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    fn save(&self, name: &str, png: &[u8]) -> Result<PathBuf>;
+
+    /// Writes frames to files and says where they are.
+    ///
+    /// # Errors
+    /// They cannot be written.
+    fn export(&self, frames: &dyn FrameSource, task: &Task) -> Result<PathBuf>;
+}
+
+/// What a file held.
+pub enum Opened {
+    /// Frames, to be fitted.
+    Capture(Sequence),
+    /// A loom.
+    Loom(Arc<Loom>),
+}
+
+/// How the studio looks.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// What stands in the status line.
+    pub name: String,
+    /// How pictures are shown.
+    pub graphics: Protocol,
+    /// Whether the terminal's background is dark.
+    pub dark: bool,
+    /// Whether colours are wanted.
+    pub colour: bool,
+    /// Whether the terminal has all colours, not 256.
+    pub true_colour: bool,
+}
+
+/// Runs the studio until it is quit. `task` is cancelled when the program is to end.
+///
+/// # Errors
+/// There is no terminal, or it is gone; cancellation.
+pub fn run(options: &Options, files: Arc<dyn Files>, task: &Task) -> Result<()> {
+    let screen = size().map_err(lost)?;
+    let depth = match (options.colour, options.true_colour) {
+        (false, _) => Depth::Mono,
+        (true, false) => Depth::Indexed,
+        (true, true) => Depth::True,
+    };
+    let look = Look {
+        dark: options.dark,
+        depth,
+    };
+    let cell = cell_size(options.graphics);
+    let state = State::new(options.name.clone(), screen, cell, look);
+    let (send, receive) = mpsc::channel();
+    terminal::take().map_err(lost)?;
+    let mut studio = Studio::new(state, painter(options.graphics, look), files, send);
+    let ended = studio.run(&receive, task);
+    studio.cancel.cancel();
+    terminal::restore();
+    ended
+}
+
+#[expect(clippy::needless_pass_by_value, reason = "as map_err hands it over")]
+fn lost(error: io::Error) -> Box<Diagnostic> {
+    Box::new(Diagnostic::error(format!(
+        "the terminal cannot be used: {error}"
+    )))
+}
+
+struct Studio {
+    state: State,
+    painter: Box<dyn Painter>,
+    /// What the terminal shows.
+    shown: Buffer,
+    /// Whether it is to be cleared first.
+    stale: bool,
+    mailbox: Arc<Mailbox>,
+    files: Arc<dyn Files>,
+    events: Sender<Event>,
+    /// Ends the work in the background.
+    cancel: Task,
+    last_tick: Instant,
+}
+
+impl Studio {
+    fn new(
+        state: State,
+        painter: Box<dyn Painter>,
+        files: Arc<dyn Files>,
+        events: Sender<Event>,
+    ) -> Self {
+        Studio {
+            shown: Buffer::empty(Rect::ZERO),
+            stale: true,
+            state,
+            painter,
+            mailbox: Arc::default(),
+            files,
+            events,
+            cancel: Task::default(),
+            last_tick: Instant::now(),
+        }
+    }
+
+    fn run(&mut self, receive: &Receiver<Event>, task: &Task) -> Result<()> {
+        start_painter(Arc::clone(&self.mailbox), self.events.clone());
+        self.start_opening();
+        self.listen(task);
+        self.draw()?;
+        loop {
+            let Some(event) = self.next(receive)? else {
+                return Ok(());
+            };
+            let mut commands = update(&mut self.state, event);
+            // Whatever else has happened meanwhile is drawn once.
+            while let Ok(event) = receive.try_recv() {
+                commands.extend(update(&mut self.state, event));
+            }
+            for command in commands {
+                if !self.carry_out(command)? {
+                    return task.check().map_err(|Cancelled| Cancelled.into());
+                }
+            }
+            self.draw()?;
+        }
+    }
+
+    /// The next event; a tick while time passes; none when nothing can come any more.
+    fn next(&mut self, receive: &Receiver<Event>) -> Result<Option<Event>> {
+        if !self.state.playback.playing {
+            self.last_tick = Instant::now();
+            return Ok(receive.recv().ok());
+        }
+        let wait = FRAME.saturating_sub(self.last_tick.elapsed());
+        match receive.recv_timeout(wait) {
+            Ok(event) => Ok(Some(event)),
+            Err(RecvTimeoutError::Timeout) => {
+                let passed = self.last_tick.elapsed();
+                self.last_tick = Instant::now();
+                Ok(Some(Event::Tick(passed)))
+            }
+            Err(RecvTimeoutError::Disconnected) => Ok(None),
+        }
+    }
+
+    /// False at the end.
+    fn carry_out(&mut self, command: Command) -> Result<bool> {
+        match command {
+            Command::Draw {
+                panel,
+                number,
+                wish,
+            } => self.mailbox.ask(panel, number, wish),
+            Command::SavePicture(name, wish) => self.save_picture(name, wish),
+            Command::Export(span) => self.export(span),
+            Command::Redraw => self.stale = true,
+            Command::Suspend => {
+                terminal::suspend().map_err(lost)?;
+                self.stale = true;
+            }
+            Command::Quit => return Ok(false),
+        }
+        Ok(true)
+    }
+
+    /// Sends what has changed since the last time.
+    fn draw(&mut self) -> Result<()> {
+        let (columns, rows) = self.state.size;
+        let area = Rect::new(0, 0, columns, rows);
+        let (mut aside, mut next) = (Aside::default(), Buffer::empty(area));
+        let mut bytes = Vec::new();
+        if self.stale {
+            self.shown = Buffer::empty(area);
+            bytes.extend_from_slice(b"\x1b[0m\x1b[2J");
+        }
+        screen::draw(&self.state, &mut *self.painter, &mut next, &mut aside);
+        let changes = self.shown.diff(&next);
+        if changes.is_empty() && !self.stale && aside == Aside::default() {
+            return Ok(());
+        }
+        bytes.extend(aside.before);
+        CrosstermBackend::new(&mut bytes)
+            .draw(changes.into_iter())
+            .map_err(lost)?;
+        bytes.extend(aside.after);
+        (self.shown, self.stale) = (next, false);
+        terminal::send(&bytes).map_err(lost)
+    }
+
+    /// Keys, mouse, sizes and signals become events.
+    fn listen(&self, task: &Task) {
+        let (events, task) = (self.events.clone(), task.clone());
+        start("keyboard", move || {
+            loop {
+                if task.cancelled() {
+                    let _ = events.send(Event::Signal);
+                    return;
+                }
+                let event = match keyboard::poll(WATCH) {
+                    Ok(false) => continue,
+                    Ok(true) => keyboard::read(),
+                    Err(error) => Err(error),
+                };
+                let event = match event {
+                    Ok(keyboard::Event::Key(key)) if key.kind != KeyEventKind::Release => {
+                        Event::Key(key)
+                    }
+                    Ok(keyboard::Event::Mouse(mouse)) => Event::Mouse(mouse),
+                    Ok(keyboard::Event::Resize(columns, rows)) => Event::Resize(columns, rows),
+                    Ok(_) => continue,
+                    Err(_) => Event::Signal,
+                };
+                if events.send(event).is_err() {
+                    return;
+                }
+            }
+        });
+    }
+
+    /// Reads and fits in the background.
+    fn start_opening(&mut self) {
+        let (files, events) = (Arc::clone(&self.files), self.events.clone());
+        let cancel = self.cancel.clone();
+        self.state.work = Some(("load", 0, 0));
+        start("opening", move || {
+            let progress = Arc::new(Progress::new(events.clone()));
+            let task = Task::observed(progress).with_flag(cancel.flag());
+            if let Err(error) = open(&*files, &events, &task) {
+                let _ = events.send(Event::Answer(Answer::Failed(error)));
+            }
+        });
+    }
+
+    fn save_picture(&self, name: String, wish: Wish) {
+        let (files, events) = (Arc::clone(&self.files), self.events.clone());
+        start("picture", move || {
+            let image = Brush::default().paint(&wish).image;
+            let png = image
+                .png()
+                .map_err(|error| Diagnostic::error(format!("no picture: {error}")).into());
+            let saved = png.and_then(|png| files.save(&name, &png));
+            let answer = saved.map_or_else(Answer::NotSaved, Answer::Saved);
+            let _ = events.send(Event::Answer(answer));
+        });
+    }
+
+    fn export(&self, span: Span) {
+        let (files, events) = (Arc::clone(&self.files), self.events.clone());
+        let cancel = self.cancel.clone();
+        let Some(frames) = shown_frames(&self.state.content, span) else {
+            return;
+        };
+        start("export", move || {
+            let progress = Arc::new(Progress::new(events.clone()));
+            let task = Task::observed(progress).with_flag(cancel.flag());
+            let saved = frames.and_then(|frames| files.export(&*frames, &task));
+            let answer = saved.map_or_else(Answer::NotSaved, Answer::Saved);
+            let _ = events.send(Event::Answer(answer));
+        });
+    }
+}
+
+/// The frames between two times, if there are any.
+fn shown_frames(content: &Content, span: Span) -> Option<Result<Box<dyn FrameSource>>> {
+    match content {
+        Content::Nothing | Content::FirstFrame(_) => None,
+        Content::Capture(scene) => {
+            let first = span.from.ceil() as usize - 1;
+            let last = (span.to.floor() as usize).clamp(first + 1, scene.of.0.frames());
+            Some(Ok(Box::new(scene.of.0.slice(first..last))))
+        }
+        Content::Loom(scene, _) => {
+            let loom = &scene.of.0;
+            let count = (span.to - span.from + 1e-9) as usize;
+            let times = (0..=count).map(|i| span.from + i as f64).collect();
+            let sampling = Sampling {
+                times,
+                fps: loom.fps(),
+            };
+            Some(Ok(Box::new(Sampled::new(Loom::clone(loom), sampling))))
+        }
+    }
+}
+
+/// First frame, all frames, loom: each is shown as soon as it is there.
+fn open(files: &dyn Files, events: &Sender<Event>, task: &Task) -> Result<()> {
+    let say = |content, warnings| {
+        let _ = events.send(Event::Answer(Answer::Opened(Box::new(content), warnings)));
+    };
+    // What is wrong with the first frame is said again, with its place, by opening everything.
+    if let Ok(Some(first)) = files.first(task)
+        && let Some(bounds) = Bounds::of(first.frame(0))
+    {
+        let scene = Scene {
+            of: Same::new(first),
+            bounds,
+        };
+        say(Content::FirstFrame(scene), Vec::new());
+    }
+    let mut warnings = Vec::new();
+    let loom = match files.open(task)?.unpack(&mut warnings) {
+        Opened::Loom(loom) => loom,
+        Opened::Capture(sequence) => {
+            if let Some(bounds) = box_of(&sequence)? {
+                let scene = Scene {
+                    of: Same::new(sequence.clone()),
+                    bounds,
+                };
+                say(Content::Capture(scene), std::mem::take(&mut warnings));
+            }
+            let fitted = fit(&sequence, &FitOptions::default(), task)?;
+            Arc::new(fitted.unpack(&mut warnings))
+        }
+    };
+    let (map, times) = plot_loom(&loom);
+    let bounds = box_of_loom(&loom)?;
+    let scene = Scene {
+        of: Same(loom),
+        bounds,
+    };
+    say(
+        Content::Loom(scene, Same::new(Signals { map, times })),
+        warnings,
+    );
+    Ok(())
+}
+
+fn box_of(frames: &dyn FrameSource) -> Result<Option<Bounds>> {
+    Bounds::of_frames(frames)
+        .map_err(|error| Diagnostic::error(format!("a frame cannot be fetched: {error}")).into())
+}
+
+/// The box around some of a loom's frames, the first and the last among them.
+fn box_of_loom(loom: &Loom) -> Result<Bounds> {
+    let n = loom.frames();
+    let count = n.min(BOUNDS_SAMPLES);
+    let mut all: Option<Bounds> = None;
+    for index in 0..count {
+        let t = 1.0 + (index * (n - 1)) as f64 / (count - 1).max(1) as f64;
+        let one = Bounds::of(&loom.at(t)?);
+        all = all.into_iter().chain(one).reduce(Bounds::join);
+    }
+    Ok(all.unwrap_or(Bounds {
+        min: [0.0; 3],
+        max: [0.0; 3],
+    }))
+}
+
+/// Tells the studio how far the work has come, not oftener than it can be seen.
+struct Progress {
+    events: Sender<Event>,
+    now: std::sync::Mutex<(&'static str, usize, usize, Instant)>,
+}
+
+impl Progress {
+    fn new(events: Sender<Event>) -> Self {
+        let now = std::sync::Mutex::new(("", 0, 0, Instant::now()));
+        Progress { events, now }
+    }
+
+    fn tell(&self, phase: &'static str, done: usize, steps: usize) {
+        let answer = Answer::Progress(phase, done, steps);
+        let _ = self.events.send(Event::Answer(answer));
+    }
+}
+
+impl Observer for Progress {
+    fn phase(&self, name: &'static str, steps: usize) {
+        if let Ok(mut now) = self.now.lock() {
+            *now = (name, 0, steps, Instant::now());
+        }
+        self.tell(name, 0, steps);
+    }
+
+    fn step(&self) {
+        let Ok(mut now) = self.now.lock() else { return };
+        now.1 += 1;
+        if now.3.elapsed() >= Duration::from_millis(100) {
+            now.3 = Instant::now();
+            self.tell(now.0, now.1, now.2);
+        }
+    }
+}

@@ -1,0 +1,269 @@
+//! Work on other threads: pictures (the newest question of each panel counts), and opening, fitting and
+//! writing, one after another.
+
+use std::collections::VecDeque;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::mpsc::Sender;
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::thread;
+
+use super::event::{Answer, Event};
+use super::state::{MeshView, Same, Scene, Signals};
+use super::theme::Look;
+use crate::image::Image;
+use crate::loom::{Loom, Scratch};
+use crate::mesh::{Bounds, FrameSource, Sequence, Topology};
+use crate::plot::{Plane, Theme, pose_space, raster, time_signals};
+use crate::view::{Camera, Renderer, Style, Surface, Wire};
+
+/// Opacity of the frames before and after.
+const SKIN: f32 = 0.22;
+/// How far away they are, in frames.
+const SKINS: [f64; 4] = [-4.0, 4.0, -2.0, 2.0];
+
+/// A picture that is wanted: two wishes that are equal have the same picture.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Wish {
+    pub(super) subject: Subject,
+    /// Width and height in pixels.
+    pub(super) size: (usize, usize),
+    /// Size of letters in pixels; 0: none.
+    pub(super) text: f32,
+    pub(super) look: Look,
+}
+
+/// What a picture shows.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Subject {
+    /// The map, a part of it, and the time between the marks.
+    Map {
+        signals: Same<Signals>,
+        window: Option<[[f64; 2]; 2]>,
+        span: Option<[f64; 2]>,
+    },
+    /// The signals over time.
+    Times(Same<Signals>),
+    /// The mesh.
+    Mesh(Pose, MeshView),
+}
+
+/// Which mesh.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Pose {
+    /// A frame of a capture, from 0.
+    Frame(Scene<Sequence>, usize),
+    /// psi(t).
+    Time(Scene<Loom>, f64),
+    /// g at a place of the map.
+    Place(Scene<Loom>, [f64; 2]),
+}
+
+/// A picture and where data lies in it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Picture {
+    pub(super) image: Image,
+    /// One for a map, one for each of the time signals, none for a mesh.
+    pub(super) planes: Vec<Plane>,
+}
+
+/// Buffers that pictures are drawn with.
+#[derive(Debug, Default)]
+pub(super) struct Brush {
+    renderer: Renderer,
+    scratch: Scratch,
+    positions: Vec<f32>,
+}
+
+impl Brush {
+    /// The picture of a wish.
+    pub(super) fn paint(&mut self, wish: &Wish) -> Picture {
+        let theme = wish.look.plot(wish.text);
+        let (width, height) = (wish.size.0 as f32, wish.size.1 as f32);
+        match &wish.subject {
+            Subject::Map {
+                signals,
+                window,
+                span,
+            } => {
+                let mut map = signals.0.map.clone();
+                (map.window, map.span) = (*window, *span);
+                let (scene, plane) = pose_space(&map, width, height, &theme);
+                Picture {
+                    image: raster(&scene, 1.0),
+                    planes: vec![plane],
+                }
+            }
+            Subject::Times(signals) => {
+                let (scene, planes) = time_signals(&signals.0.times, width, height, &theme);
+                Picture {
+                    image: raster(&scene, 1.0),
+                    planes,
+                }
+            }
+            Subject::Mesh(pose, view) => Picture {
+                image: self.mesh(pose, view, wish, &theme),
+                planes: Vec::new(),
+            },
+        }
+    }
+
+    fn mesh(&mut self, pose: &Pose, view: &MeshView, wish: &Wish, theme: &Theme) -> Image {
+        // Few pixels are drawn twice as fine, so that outlines are smooth.
+        let fine = if wish.size.0 * wish.size.1 < 60_000 {
+            2
+        } else {
+            1
+        };
+        let mut image = Image::new(fine * wish.size.0, fine * wish.size.1);
+        let camera = camera(&pose.bounds(), view, wish.size);
+        let wire = view.wires.then(|| Wire {
+            colour: rgb(theme.series[0].0),
+            width: fine as f32,
+        });
+        let style = Style {
+            wire,
+            ..wish.look.mesh()
+        };
+        image.fill(style.background);
+        if let (true, Pose::Time(scene, t)) = (view.onion, pose) {
+            let times = SKINS.map(|offset| t + offset);
+            let last = scene.of.0.frames() as f64;
+            let there = times.into_iter().filter(|t| (1.0..=last).contains(t));
+            let faint = Style {
+                opacity: SKIN,
+                wire: None,
+                ..style
+            };
+            for time in there {
+                self.layer(
+                    &Pose::Time(scene.clone(), time),
+                    &camera,
+                    &faint,
+                    &mut image,
+                );
+            }
+        }
+        self.layer(pose, &camera, &style, &mut image);
+        if fine == 2 { image.halved() } else { image }
+    }
+
+    fn layer(&mut self, pose: &Pose, camera: &Camera, style: &Style, image: &mut Image) {
+        let topology = Arc::clone(pose.topology());
+        self.positions.resize(3 * topology.vertices(), 0.0);
+        match pose {
+            Pose::Frame(scene, frame) => self.positions.copy_from_slice(scene.of.0.frame(*frame)),
+            Pose::Time(scene, t) => {
+                let Ok(()) = scene
+                    .of
+                    .0
+                    .evaluate(*t, &mut self.scratch, &mut self.positions)
+                else {
+                    return;
+                };
+            }
+            Pose::Place(scene, at) => match scene.of.0.pose_at(*at) {
+                Ok(positions) => self.positions = positions,
+                Err(_) => return,
+            },
+        }
+        let surface = Surface {
+            triangles: topology.triangles(),
+            positions: &self.positions,
+            colours: None,
+        };
+        self.renderer.overlay(surface, camera, style, image);
+    }
+}
+
+impl Pose {
+    fn bounds(&self) -> Bounds {
+        match self {
+            Pose::Frame(scene, _) => scene.bounds,
+            Pose::Time(scene, _) | Pose::Place(scene, _) => scene.bounds,
+        }
+    }
+
+    fn topology(&self) -> &Arc<Topology> {
+        match self {
+            Pose::Frame(scene, _) => scene.of.0.topology(),
+            Pose::Time(scene, _) | Pose::Place(scene, _) => scene.of.0.topology(),
+        }
+    }
+}
+
+/// Framed from the first direction, then turned: orbiting does not change the size.
+fn camera(bounds: &Bounds, view: &MeshView, size: (usize, usize)) -> Camera {
+    let mut camera = Camera::framing(bounds, size.0 as f64 / size.1.max(1) as f64);
+    (camera.yaw, camera.pitch) = (view.yaw, view.pitch);
+    camera.zoom(view.zoom);
+    camera
+}
+
+fn rgb(colour: [u8; 4]) -> [u8; 3] {
+    [colour[0], colour[1], colour[2]]
+}
+
+/// Questions of the panels that nobody has begun to answer: at most one each.
+#[derive(Debug, Default)]
+pub(super) struct Mailbox {
+    waiting: Mutex<VecDeque<(usize, u64, Wish)>>,
+    more: Condvar,
+}
+
+impl Mailbox {
+    /// Puts a question in; an older one of the same panel is replaced.
+    pub(super) fn ask(&self, panel: usize, number: u64, wish: Wish) {
+        let mut waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
+        match waiting.iter_mut().find(|(other, ..)| *other == panel) {
+            Some(old) => *old = (panel, number, wish),
+            None => waiting.push_back((panel, number, wish)),
+        }
+        self.more.notify_one();
+    }
+
+    fn next(&self) -> (usize, u64, Wish) {
+        let mut waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
+        loop {
+            if let Some(question) = waiting.pop_front() {
+                return question;
+            }
+            waiting = self
+                .more
+                .wait(waiting)
+                .unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+}
+
+/// Starts a thread that draws what is asked for in `mailbox` until nobody listens.
+pub(super) fn start_painter(mailbox: Arc<Mailbox>, events: Sender<Event>) {
+    let work = move || {
+        let mut brush = Brush::default();
+        loop {
+            let (panel, number, wish) = mailbox.next();
+            let drawn = catch_unwind(AssertUnwindSafe(|| brush.paint(&wish)));
+            let Ok(picture) = drawn else {
+                brush = Brush::default();
+                continue;
+            };
+            let picture = Arc::new(picture);
+            let answer = Answer::Drawn {
+                panel,
+                number,
+                picture,
+            };
+            if events.send(Event::Answer(answer)).is_err() {
+                return;
+            }
+        }
+    };
+    start("painter", work);
+}
+
+/// Starts a thread of that name. The name of worker threads begins with "studio", so that their panics
+/// leave the screen alone.
+pub(super) fn start(name: &str, work: impl FnOnce() + Send + 'static) {
+    let builder = thread::Builder::new().name(format!("studio {name}"));
+    // A machine without threads cannot run the studio at all; the rayon pool would have failed before.
+    let _ = builder.spawn(work);
+}
