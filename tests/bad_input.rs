@@ -608,3 +608,53 @@ fn a_loom_that_would_replace_its_input() {
         &["in.loom", "input"],
     );
 }
+
+/// One triangle in a buffer of its own file.
+const GLTF: &str = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
+"accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}],
+"bufferViews":[{"buffer":0,"byteLength":36}],"buffers":[{"uri":"in.bin","byteLength":36}]}"#;
+
+#[test]
+fn damaged_gltf() {
+    let line = "convert in.gltf -o out";
+    let with_buffer = |text: String, buffer: Vec<u8>| {
+        move |folder: &Path| {
+            fs::write(folder.join("in.gltf"), text).unwrap();
+            fs::write(folder.join("in.bin"), buffer).unwrap();
+        }
+    };
+    let (whole, buffer) = (GLTF.to_string(), vec![0; 36]);
+    let cut = whole[..whole.len() / 2].to_string();
+    refused(with_buffer(cut, buffer.clone()), line, &["in.gltf"]);
+    refused(with_buffer(whole.clone(), vec![0; 20]), line, &["in."]);
+    refused(file("in.gltf", GLTF), line, &["in.bin", "no such file"]);
+    refused(file("in.gltf", ""), line, &["in.gltf"]);
+    refused(file("in.gltf", good().obj(0)), line, &["in.gltf"]);
+    for (claim, huge) in [
+        ("\"count\":3", "\"count\":178956970"),
+        ("Length\":36", "Length\":2147483640"),
+    ] {
+        let text = whole.replace(claim, huge);
+        refused(with_buffer(text, buffer.clone()), line, &["in."]);
+    }
+    let far = whole.replace("in.bin", "../../in.bin");
+    refused(with_buffer(far, buffer), line, &["in.bin"]);
+}
+
+#[test]
+fn damaged_glb() {
+    let mut header = b"glTF".to_vec();
+    header.extend(2u32.to_le_bytes());
+    header.extend(2_000_000_000u32.to_le_bytes());
+    header.extend(1_999_999_980u32.to_le_bytes());
+    header.extend(b"JSON");
+    header.resize(1024, b' ');
+    for length in [1024, 20, 12, 7, 0] {
+        refused(
+            file("in.glb", &header[..length]),
+            "convert in.glb -o out",
+            &["in.glb"],
+        );
+    }
+}

@@ -704,3 +704,58 @@ fn a_plot_is_png_or_svg_by_its_ending() {
     meshloom(folder.path(), "plot s.loom -o p.jpg").fails_with(&["p.jpg", ".png"]);
     meshloom(folder.path(), "plot s.loom -o s.loom").fails_with(&["s.loom"]);
 }
+
+#[test]
+fn few_frames_and_no_motion_are_fitted_too() {
+    let folder = tempdir().unwrap();
+    for frames in 1..=5 {
+        let name = format!("s{frames}");
+        sheet(4, frames).write_objs(&folder.path().join(&name));
+        meshloom(folder.path(), &format!("fit {name} -o {name}.loom")).done();
+        let compare = format!("compare {name} {name}.loom --json");
+        let found = meshloom(folder.path(), &compare).done().object();
+        assert!(found["max"].as_f64().unwrap() < 0.1, "{frames}: {found}");
+        meshloom(folder.path(), &format!("plot {name}.loom -o {name}.png")).done();
+    }
+    let mut still = sheet(4, 1);
+    still.frames = vec![still.frames[0].clone(); 6];
+    still.write_objs(&folder.path().join("still"));
+    let fit = meshloom(folder.path(), "fit still -o still.loom --json")
+        .done()
+        .object();
+    assert_eq!(fit["error"]["total"], 0.0);
+    let found = meshloom(folder.path(), "compare still still.loom --json")
+        .done()
+        .object();
+    assert!(found["max"].as_f64().unwrap() < 1e-6);
+    // Against frames that move, an error relative to no motion has no number.
+    sheet(4, 6).write_objs(&folder.path().join("moving"));
+    let found = meshloom(folder.path(), "compare still moving --json").done();
+    assert!(found.object()["kg_percent"].is_null());
+    assert!(found.stderr.contains("not defined"), "{}", found.stderr);
+}
+
+#[test]
+fn a_gltf_animation_is_a_capture() {
+    let Some(data) = support::real_captures() else {
+        return;
+    };
+    let folder = tempdir().unwrap();
+    let fox = data.join("fox/Fox.glb");
+    // Three animations: the choice is said.
+    let run = meshloom(folder.path(), &format!("info {}", fox.display())).done();
+    for name in ["Survey", "Walk", "Run"] {
+        assert!(run.stderr.contains(name), "{}", run.stderr);
+    }
+    let info = format!("info {}#Walk --json", fox.display());
+    let walk = meshloom(folder.path(), &info).done().object();
+    assert_eq!(
+        (walk["format"].as_str(), walk["closed"].as_bool()),
+        (Some("glTF"), Some(true))
+    );
+    meshloom(
+        folder.path(),
+        &format!("fit {}#Walk -o walk.loom", fox.display()),
+    )
+    .done();
+}

@@ -5,22 +5,25 @@ use std::path::{Path, PathBuf};
 use clap::builder::PossibleValuesParser;
 use serde_json::{Value, json};
 
+use super::fit;
 use super::report;
 use super::session::{Outcome, Session};
-use super::{fit, plot};
 use crate::demo::{DEMOS, Demo};
 use crate::diag::Result;
 use crate::loom::fit::FitOptions;
 use crate::mesh::FrameSource;
-use crate::pipeline::{self, Output};
+use crate::pipeline::plot::save_plot;
+use crate::pipeline::{self, contact_sheet, save_picture};
 use crate::plot::Theme;
 use crate::sample::{Sampled, Times};
 use crate::signal::root::RootKind;
 
 /// In-betweens are what a loom is for: frames are written at twice the rate.
 const RATE: f64 = 2.0;
+/// Frames on the contact sheet.
+const SHEET: usize = 24;
 
-/// Fit a built-in capture; write its frames at twice the rate and a picture
+/// Fit a built-in capture; write frames at twice its rate and pictures
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// Which capture
@@ -48,83 +51,81 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<Outcome> {
         ..FitOptions::default()
     };
     let loom = fit::fitted(session, &capture, &options)?;
-    let file = |ending: &str| args.write.join(demo.name).with_extension(ending);
-    let mut outputs = Vec::new();
-    let mut save = |saved: pipeline::Saved| outputs.extend(saved.outputs);
-    let loom_file = Output::from(file("loom"));
-    save(pipeline::save_loom(
-        session.world(),
-        &loom,
-        &loom_file,
-        &session.task,
-    )?);
-    let picture = Output::from(file("png"));
-    save(plot::draw(
-        session,
-        &loom,
-        demo.name,
-        &picture,
-        [1200.0, 560.0],
-        &Theme::light(),
-    )?);
+    let files = Files::of(demo, &args.write);
     let frames = Sampled::new(
         loom.clone(),
         Times::Rate(RATE).over(loom.frames(), loom.fps())?,
     );
-    let pattern = Output::from(args.write.join("frames").join("frame_####.obj"));
-    save(pipeline::save(
-        session.world(),
-        &frames,
-        &pattern,
-        &session.task,
-    )?);
+    let (world, task) = (session.world(), &session.task);
+    let theme = Theme::light();
+    let sheet = contact_sheet(&capture, SHEET, demo.view, &theme, task)?;
+    let saved = [
+        pipeline::save_loom(world, &loom, &files.loom.as_path().into(), task)?,
+        save_plot(world, &loom, &files.map.as_path().into(), &theme)?,
+        save_picture(world, &sheet, &files.sheet.as_path().into(), 1.0)?,
+        pipeline::save(
+            world,
+            &frames,
+            &files.frames.join("frame_####.obj").into(),
+            task,
+        )?,
+    ];
+    let outputs = saved.into_iter().flat_map(|saved| saved.outputs);
+    let outputs: Vec<PathBuf> = outputs.collect();
     Ok(Outcome {
         object: json!({
             "demo": demo.name,
             "outputs": report::paths(&outputs),
             "frames": frames.frames(),
-            "report": fit::report(session, loom.report()),
+            "report": **loom.report(),
             "seconds": session.progress.seconds(&fit::PHASES),
             "warnings": [],
         }),
-        report: told(
-            args,
-            demo,
-            session,
-            &fit::summary(session, demo.name, loom.report()),
+        report: format!(
+            "{}\n{}{}",
+            demo.about,
+            fit::summary(session, demo.name, loom.report()),
+            files.table(session)
         ),
         ..Outcome::default()
     })
 }
 
-/// The report, what was written, and what to try next.
-fn told(args: &Args, demo: &Demo, session: &Session, summary: &str) -> String {
-    let shown = |path: &Path| path.display().to_string();
-    let loom = shown(&args.write.join(demo.name).with_extension("loom"));
-    let rows = [
-        (
-            shown(&args.write.join(demo.name).with_extension("png")),
-            "its map and time signals",
-        ),
-        (
-            shown(&args.write.join("frames")),
-            "its frames at twice the rate",
-        ),
-        (
-            loom.clone(),
-            "the loom; try `meshloom sample` and `meshloom plot` on it",
-        ),
-    ];
-    let rows: Vec<(&str, String)> = rows
-        .iter()
-        .map(|(name, what)| (name.as_str(), what.to_string()))
-        .collect();
-    format!(
-        "{}\n{}{}",
-        demo.about,
-        summary,
+/// Where a demo's results go.
+struct Files {
+    loom: PathBuf,
+    map: PathBuf,
+    sheet: PathBuf,
+    frames: PathBuf,
+}
+
+impl Files {
+    fn of(demo: &Demo, folder: &Path) -> Self {
+        let file = |ending: &str| folder.join(format!("{}{ending}", demo.name));
+        Files {
+            loom: file(".loom"),
+            map: file(".png"),
+            sheet: file("-frames.png"),
+            frames: folder.join("frames"),
+        }
+    }
+
+    fn table(&self, session: &Session) -> String {
+        let rows = [
+            (&self.map, "its map of poses and its time signals"),
+            (&self.sheet, "what it looks like"),
+            (&self.frames, "its frames at twice the rate"),
+            (
+                &self.loom,
+                "the loom, for `meshloom sample` and `meshloom plot`",
+            ),
+        ];
+        let rows = rows.map(|(path, what)| (path.display().to_string(), what.to_string()));
+        let rows = rows
+            .each_ref()
+            .map(|(path, what)| (path.as_str(), what.clone()));
         report::table(session.style, "written", &rows)
-    )
+    }
 }
 
 fn list(session: &Session) -> Outcome {

@@ -12,7 +12,7 @@ use crate::diag::Diagnostic;
 use crate::task::Cancelled;
 
 /// How long the work may take to notice: with what remains to be cleaned up, below 100 ms.
-const GRACE: Duration = Duration::from_millis(60);
+const GRACE: Duration = Duration::from_millis(40);
 
 /// Whoever takes this first prints the end of the run; the other stays silent.
 #[derive(Debug, Clone, Default)]

@@ -7,9 +7,8 @@ use serde_json::json;
 use super::report;
 use super::session::{Outcome, Session};
 use crate::diag::Result;
-use crate::loom::Loom;
 use crate::pipeline::plot::{caption, figure, plot_loom};
-use crate::pipeline::{Output, Saved, save_picture};
+use crate::pipeline::{Output, save_picture};
 use crate::plot::Theme;
 
 /// Pixels of a PNG to a unit of the figure: text stays readable on dense screens and in print.
@@ -49,29 +48,16 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<Outcome> {
     };
     let output = Output::from(&args.output).protecting(std::slice::from_ref(&args.loom));
     let name = args.loom.file_stem().unwrap_or_default().to_string_lossy();
-    let saved = draw(session, &loom, &name, &output, args.size, &theme)?;
+    session.task.phase("draw", 0);
+    let (map, signals) = plot_loom(&loom);
+    let title = format!("{name}: {}", caption(&loom));
+    let scene = figure(&map, &signals, &title, args.size, &theme);
+    let saved = save_picture(session.world(), &scene, &output, SCALE)?;
     Ok(Outcome {
         object: json!({ "outputs": report::paths(&saved.outputs), "warnings": [] }),
         report: report::table(session.style, &args.output.display().to_string(), &[]),
         ..Outcome::default()
     })
-}
-
-/// Draws a loom's figure under its name.
-pub(super) fn draw(
-    session: &Session,
-    loom: &Loom,
-    name: &str,
-    output: &Output,
-    size: [f32; 2],
-    theme: &Theme,
-) -> Result<Saved> {
-    session.task.phase("draw", 0);
-    let (map, signals) = plot_loom(loom);
-    let title = format!("{name}: {}", caption(loom));
-    let scene = figure(&map, &signals, &title, size, theme);
-    session.task.check()?;
-    save_picture(session.world(), &scene, output, SCALE)
 }
 
 /// `WIDTHxHEIGHT`, each from 100 to 10000.
