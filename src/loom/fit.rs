@@ -13,7 +13,7 @@ use crate::diag::{Diagnostic, Result, Warned};
 use crate::math::pca::{Rows, Table};
 use crate::mesh::{FrameSource, Sequence};
 use crate::signal::root::RootKind;
-use crate::space::{ShapeSpace, SpaceError, Spaces, encode_frames};
+use crate::space::{ShapeSpace, Spaces, encode_frames};
 use crate::task::Task;
 
 /// So many frames at most show a space that adapts to them what it will have to hold.
@@ -182,17 +182,8 @@ fn open_space(sequence: &Sequence, frames: &Frames<'_>, name: &str) -> Result<Ar
         .map(|sample| read(sample * (n - 1) / (count - 1).max(1)))
         .collect();
     let samples: Vec<&[f64]> = samples.iter().map(Vec::as_slice).collect();
-    Spaces::new(Arc::clone(sequence.topology()), &read(0))
-        .open(name, &samples)
-        .map_err(|error| unsuitable(&error))
-}
-
-fn unsuitable(error: &SpaceError) -> Box<Diagnostic> {
-    let diagnostic = Diagnostic::error(error.to_string());
-    Box::new(match error {
-        SpaceError::Singular { vertex } => diagnostic.at_vertex(vertex + 1),
-        SpaceError::TooLarge | SpaceError::Unsuitable { .. } => diagnostic,
-    })
+    let spaces = Spaces::new(Arc::clone(sequence.topology()), &read(0));
+    Ok(spaces.open(name, &samples)?)
 }
 
 /// All frames in a space, row after row, and how many rotations turned too far in one step.

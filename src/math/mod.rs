@@ -10,6 +10,7 @@ pub mod monotone;
 pub mod order_graph;
 pub mod ordered;
 pub mod pca;
+pub mod pivoted_qr;
 pub mod rotation;
 pub mod rotation_graph;
 pub mod sparse;

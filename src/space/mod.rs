@@ -26,6 +26,9 @@ mod vertices;
 use std::fmt;
 use std::ops::Range;
 
+use crate::diag::Diagnostic;
+use crate::math::sparse::SparseError;
+
 pub use gradients::Gradients;
 pub use lengths_angles::LengthsAngles;
 pub use lri::Lri;
@@ -101,9 +104,21 @@ impl fmt::Display for SpaceError {
 
 impl std::error::Error for SpaceError {}
 
-impl From<crate::math::sparse::SparseError> for SpaceError {
-    fn from(error: crate::math::sparse::SparseError) -> Self {
-        use crate::math::sparse::SparseError;
+/// As something to tell a person, with the vertex counted from 1.
+impl From<SpaceError> for Box<Diagnostic> {
+    fn from(error: SpaceError) -> Self {
+        let diagnostic = Diagnostic::error(error.to_string());
+        Box::new(match error {
+            SpaceError::Singular { vertex } => diagnostic
+                .at_vertex(vertex + 1)
+                .hint("the reference pose has numbers there that are not finite or far too large"),
+            SpaceError::TooLarge | SpaceError::Unsuitable { .. } => diagnostic,
+        })
+    }
+}
+
+impl From<SparseError> for SpaceError {
+    fn from(error: SparseError) -> Self {
         match error {
             SparseError::NotPositiveDefinite { unknown } => {
                 SpaceError::Singular { vertex: unknown }

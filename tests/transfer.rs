@@ -1,0 +1,219 @@
+//! Deformation transfer: what it reproduces, what it keeps, what it refuses.
+
+use std::sync::Arc;
+
+use meshloom::edit::transfer::{Examples, transfer};
+use meshloom::loom::Loom;
+use meshloom::loom::fit::{FitOptions, fit};
+use meshloom::mesh::{FrameSource, Sequence, Topology};
+use meshloom::space::SPACES;
+use meshloom::task::Task;
+
+/// A tube along x of `length` rings of `around` vertices.
+fn tube(length: usize, around: usize, radius: f64) -> (Arc<Topology>, Vec<f64>) {
+    let at = |i: usize, j: usize| (i * around + j % around) as u32;
+    let (mut points, mut triangles) = (Vec::new(), Vec::new());
+    for i in 0..length {
+        for j in 0..around {
+            let angle = std::f64::consts::TAU * j as f64 / around as f64;
+            let x = 4.0 * i as f64 / (length - 1) as f64 - 2.0;
+            points.extend([x, radius * angle.cos(), radius * angle.sin()]);
+            if i > 0 {
+                let [a, b, c, d] = [at(i - 1, j), at(i - 1, j + 1), at(i, j + 1), at(i, j)];
+                triangles.extend([[a, b, c], [a, c, d]]);
+            }
+        }
+    }
+    let topology = Topology::from_triangles(length * around, &triangles).unwrap();
+    (Arc::new(topology), points)
+}
+
+/// Bent about z by `bend` and sheared up by `lift`, as example poses of any tube.
+fn posed(points: &[f64], bend: f64, lift: f64) -> Vec<f64> {
+    let point = |p: &[f64]| {
+        let (x, y) = match bend == 0.0 {
+            true => (p[0], p[1]),
+            false => {
+                let radius = 4.0 / bend;
+                let (sine, cosine) = (p[0] / radius).sin_cos();
+                ((radius - p[1]) * sine, radius - (radius - p[1]) * cosine)
+            }
+        };
+        [x, y, p[2] + lift * x]
+    };
+    points.chunks_exact(3).flat_map(point).collect()
+}
+
+const POSES: [(f64, f64); 4] = [(0.0, 0.0), (1.5, 0.0), (0.0, 0.5), (-1.0, 0.3)];
+
+fn sequence(topology: &Arc<Topology>, frames: &[Vec<f64>]) -> Sequence {
+    let values = frames.concat().into_iter().map(|x| x as f32).collect();
+    Sequence::new(Arc::clone(topology), values, Some(24.0))
+}
+
+fn example_poses(topology: &Arc<Topology>, points: &[f64]) -> Sequence {
+    let poses = POSES.map(|(bend, lift)| posed(points, bend, lift));
+    sequence(topology, &poses)
+}
+
+/// Everything kept: every frame is reproduced.
+fn exact(capture: &Sequence, space: &str) -> Loom {
+    let n = capture.frames();
+    let options = FitOptions {
+        space: space.to_string(),
+        controls: Some(n + 2),
+        sites: Some(n),
+        modes: Some(n - 1),
+        left_out: false,
+        ..FitOptions::default()
+    };
+    fit(capture, &options, &Task::default()).unwrap().output
+}
+
+fn farthest(a: &[f32], b: &[f32]) -> f32 {
+    let pairs = a.iter().zip(b);
+    pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+}
+
+/// Single precision in and out of a size of four.
+const ROUNDING: f32 = 4e-6;
+
+#[test]
+fn examples_become_their_targets() {
+    let (source, points) = tube(12, 8, 0.4);
+    let (target, others) = tube(9, 10, 0.7);
+    let examples = Examples::new(
+        example_poses(&source, &points),
+        example_poses(&target, &others),
+    )
+    .unwrap();
+    for space in SPACES {
+        let loom = exact(&example_poses(&source, &points), space.name);
+        let found = transfer(&loom, &examples, &Task::default()).unwrap().output;
+        let expected = example_poses(&target, &others);
+        for frame in 0..POSES.len() {
+            let shape = found.loom.at((frame + 1) as f64).unwrap();
+            let error = farthest(&shape, expected.frame(frame));
+            assert!(error < ROUNDING, "{}, frame {frame}: {error}", space.name);
+            assert!(found.coverage[frame] < 1e-5);
+        }
+    }
+}
+
+#[test]
+fn transfer_to_the_same_examples_changes_nothing_inside_their_span() {
+    let (topology, points) = tube(12, 8, 0.4);
+    let poses = example_poses(&topology, &points);
+    let examples = Examples::new(poses.clone(), poses.clone()).unwrap();
+    for space in SPACES {
+        // h(g(p)) is a blend of the examples at every time
+        let loom = exact(&poses, space.name);
+        let found = transfer(&loom, &examples, &Task::default())
+            .unwrap()
+            .output
+            .loom;
+        for step in 0..=12 {
+            let t = 1.0 + 0.25 * f64::from(step);
+            let error = farthest(&found.at(t).unwrap(), &loom.at(t).unwrap());
+            assert!(error < ROUNDING, "{}, time {t}: {error}", space.name);
+        }
+    }
+}
+
+#[test]
+fn a_loom_about_another_pose_reproduces_the_examples_too() {
+    let (topology, points) = tube(12, 8, 0.4);
+    let poses = example_poses(&topology, &points);
+    let examples = Examples::new(poses.clone(), poses.clone()).unwrap();
+    let order = [2, 0, 3, 1];
+    let frames = order.map(|i| posed(&points, POSES[i].0, POSES[i].1));
+    for space in SPACES {
+        let loom = exact(&sequence(&topology, &frames), space.name);
+        let found = transfer(&loom, &examples, &Task::default())
+            .unwrap()
+            .output
+            .loom;
+        for (frame, &pose) in order.iter().enumerate() {
+            let shape = found.at((frame + 1) as f64).unwrap();
+            let error = farthest(&shape, poses.frame(pose));
+            assert!(error < ROUNDING, "{}, frame {frame}: {error}", space.name);
+        }
+    }
+}
+
+#[test]
+fn time_stays_and_an_edit_before_or_after_is_the_same() {
+    let (topology, points) = tube(12, 8, 0.4);
+    let (target, others) = tube(9, 10, 0.7);
+    let examples = Examples::new(
+        example_poses(&topology, &points),
+        example_poses(&target, &others),
+    )
+    .unwrap();
+    let frames: Vec<Vec<f64>> = (0..8)
+        .map(|i| posed(&points, 0.2 * f64::from(i), 0.05 * f64::from(i * i)))
+        .collect();
+    let loom = exact(&sequence(&topology, &frames), "vertices");
+    let found = transfer(&loom, &examples, &Task::default())
+        .unwrap()
+        .output
+        .loom;
+    assert_eq!(found.time(), loom.time());
+    assert_eq!(found.pose().sites(), loom.pose().sites());
+    assert_eq!(found.topology().vertices(), target.vertices());
+    assert_eq!(found.fps(), Some(24.0));
+}
+
+#[test]
+fn what_cannot_be_transferred_is_said() {
+    let (source, points) = tube(12, 8, 0.4);
+    let (target, others) = tube(9, 10, 0.7);
+    let (ours, theirs) = (
+        example_poses(&source, &points),
+        example_poses(&target, &others),
+    );
+    let message = |result: Result<Examples, _>| -> String {
+        let error: Box<meshloom::diag::Diagnostic> = result.err().unwrap();
+        error.message
+    };
+    assert!(message(Examples::new(ours.clone(), theirs.slice(0..3))).contains("4 source"));
+    assert!(message(Examples::new(ours.slice(0..1), theirs.slice(0..1))).contains("two pairs"));
+    let loom = exact(&ours, "gradients");
+    let swapped = Examples::new(theirs.clone(), ours.clone()).unwrap();
+    let error = transfer(&loom, &swapped, &Task::default()).err().unwrap();
+    assert!(error.message.contains("other faces"));
+    let still = sequence(&source, &[points.clone(), points.clone()]);
+    let alike = Examples::new(still, theirs.slice(0..2)).unwrap();
+    let error = transfer(&loom, &alike, &Task::default()).err().unwrap();
+    assert!(error.message.contains("reference pose"));
+}
+
+#[test]
+fn copies_and_frames_out_of_reach_are_reported() {
+    let (source, points) = tube(12, 8, 0.4);
+    let (target, others) = tube(9, 10, 0.7);
+    let poses = |points: &[f64]| {
+        let pose = |i: usize| posed(points, POSES[i].0, POSES[i].1);
+        vec![pose(0), pose(1), pose(1)]
+    };
+    let examples = Examples::new(
+        sequence(&source, &poses(&points)),
+        sequence(&target, &poses(&others)),
+    )
+    .unwrap();
+    let frames: Vec<Vec<f64>> = (0..6)
+        .map(|i| posed(&points, 0.0, 0.2 * f64::from(i)))
+        .collect();
+    let loom = exact(&sequence(&source, &frames), "vertices");
+    let found = transfer(&loom, &examples, &Task::default()).unwrap();
+    let said: Vec<&str> = found.warnings.iter().map(|w| w.message.as_str()).collect();
+    assert!(
+        said.iter()
+            .any(|message| message.contains("is a blend of the others"))
+    );
+    assert!(
+        said.iter().any(|message| message.contains("outside")),
+        "{said:?}"
+    );
+    assert!(found.output.coverage[5] > 0.9 && found.output.coverage[0] < 1e-6);
+}
