@@ -22,8 +22,12 @@ fn trajectory(n: usize, m: usize) -> (Vec<Point>, Vec<f64>) {
         let (a, b) = (1.0 + 0.37 * j as f64, 0.3 + 0.11 * (j * j % 17) as f64);
         ((a * t).sin() + (b * t + j as f64).cos()) / (1.0 + j as f64)
     };
-    let targets: Vec<f64> = (0..n).flat_map(|i| (0..m).map(move |j| wave(i, j))).collect();
-    let positions = (0..n).map(|i| [targets[i * m], targets[i * m + 1]]).collect();
+    let targets: Vec<f64> = (0..n)
+        .flat_map(|i| (0..m).map(move |j| wave(i, j)))
+        .collect();
+    let positions = (0..n)
+        .map(|i| [targets[i * m], targets[i * m + 1]])
+        .collect();
     (positions, targets)
 }
 
@@ -45,7 +49,9 @@ fn pose_greedy(bencher: Bencher, (n, _, l, m): (usize, usize, usize, usize)) {
 #[divan::bench(args = SIZES)]
 fn pose_refit(bencher: Bencher, (n, _, l, m): (usize, usize, usize, usize)) {
     let data = trajectory(n, m);
-    let signal = PoseSignal::fit(&rows(&data, m), l).expect("rows are sound").signal;
+    let signal = PoseSignal::fit(&rows(&data, m), l)
+        .expect("rows are sound")
+        .signal;
     bencher.bench(|| signal.refit(&rows(&data, m)));
 }
 

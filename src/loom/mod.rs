@@ -13,6 +13,7 @@ pub mod session;
 pub mod subspace;
 pub mod warnings;
 
+use std::fmt;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
@@ -73,6 +74,19 @@ pub struct Parts {
 #[derive(Clone)]
 pub struct Loom {
     parts: Parts,
+}
+
+/// Sizes, not numbers.
+impl fmt::Debug for Loom {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Loom")
+            .field("frames", &self.frames())
+            .field("controls", &self.parts.time.controls().len())
+            .field("sites", &self.parts.pose.sites().len())
+            .field("modes", &self.parts.shape.modes())
+            .field("space", &self.parts.space.name())
+            .finish_non_exhaustive()
+    }
 }
 
 /// Memory for evaluating one frame after another.
@@ -526,14 +540,15 @@ pub(crate) mod test_looms {
     /// The ring travelling over the ground and turning.
     pub(crate) fn travelling(vertices: usize, n: usize) -> Loom {
         let loom = ring(vertices, n, true);
-        let motions: Vec<_> = (0..n)
-            .map(|i| {
-                Isometry3::new(
-                    Vector3::new(0.5 * i as f64, 0.0, 0.1),
-                    Vector3::y() * (0.2 * i as f64),
-                )
-            })
-            .collect();
+        // The same step every frame, seen from the body: along an arc.
+        let step = Isometry3::new(Vector3::new(0.5, 0.0, 0.1), Vector3::y() * 0.2);
+        let start = Isometry3::translation(1.0, 0.0, 2.0);
+        let motions = (0..n).scan(start, |at, _| {
+            let now = *at;
+            *at *= step;
+            Some(now)
+        });
+        let motions: Vec<_> = motions.collect();
         let root = RootSignal::through(RootKind::Ground, Vector3::new(0.1, 0.2, 0.3), &motions);
         Loom::new(Parts {
             root: Some(Arc::new(root.expect("motions are finite"))),

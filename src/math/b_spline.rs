@@ -6,6 +6,8 @@
 //! u_(s+2) to u_(s+3), its shape follows from intervals s..s+5 and control points s..s+4. A clamped
 //! curve has u_0 = u_1 = u_2 and u_(k-1) = u_k = u_(k+1): its first two and last two intervals are 0.
 
+use std::ops::Range;
+
 /// A point of the plane.
 pub type Point = [f64; 2];
 
@@ -197,10 +199,89 @@ impl Curve {
         curve
     }
 
+    /// The same curve with one more knot, at `place` (Boehm): one more control point and span; two control
+    /// points become three, so the five spans about the place are the same up to rounding, all others to
+    /// the bit. None at the ends of a span, where a knot is already,
+    /// and on a point.
+    pub fn insert_knot(&self, place: Place) -> Option<Inserted> {
+        let x = place.offset;
+        if self.intervals.is_empty() || !(x > 0.0 && x < self.span_length(place.span)) {
+            return None;
+        }
+        let (s, [a, b, c, d, e]) = (place.span, self.around(place.span));
+        let rises = [(a + b + x, a + b + c), (b + x, b + c + d), (x, c + d + e)];
+        let mut controls = self.controls[..=s].to_vec();
+        for (i, (part, whole)) in rises.into_iter().enumerate() {
+            let (from, to) = (self.controls[s + i], self.controls[s + i + 1]);
+            let part = part / whole;
+            controls.push([0, 1].map(|axis| from[axis] + part * (to[axis] - from[axis])));
+        }
+        controls.extend(&self.controls[s + 3..]);
+        let mut intervals = self.intervals.clone();
+        intervals[s + 2] = x;
+        intervals.insert(s + 3, c - x);
+        let curve = Curve {
+            intervals,
+            controls,
+        };
+        Some(Inserted { curve, at: place })
+    }
+
+    /// The curve run through backwards.
+    #[must_use]
+    pub fn reversed(&self) -> Self {
+        Curve {
+            intervals: self.intervals.iter().rev().copied().collect(),
+            controls: self.controls.iter().rev().copied().collect(),
+        }
+    }
+
+    /// Spans `range` of the curve alone, bits kept.
+    ///
+    /// # Panics
+    /// The range is empty or leaves the curve.
+    #[must_use]
+    pub fn spans_of(&self, range: Range<usize>) -> Self {
+        Curve {
+            intervals: self.intervals[range.start..range.end + 4].to_vec(),
+            controls: self.controls[range.start..range.end + 3].to_vec(),
+        }
+    }
+
     /// The five intervals around `span`.
     pub fn around(&self, span: usize) -> [f64; 5] {
         let w = &self.intervals[span..span + 5];
         [w[0], w[1], w[2], w[3], w[4]]
+    }
+}
+
+/// A curve with a knot more, and where.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Inserted {
+    /// The same curve.
+    pub curve: Curve,
+    at: Place,
+}
+
+impl Inserted {
+    /// Where a place of the former curve is on this one.
+    pub fn place(&self, former: Place) -> Place {
+        let Place { span, offset } = former;
+        let at = self.at;
+        if span < at.span || (span == at.span && offset < at.offset) {
+            return former;
+        }
+        if span > at.span {
+            return Place {
+                span: span + 1,
+                offset,
+            };
+        }
+        let length = self.curve.span_length(span + 1);
+        Place {
+            span: span + 1,
+            offset: (offset - at.offset).min(length),
+        }
     }
 }
 
@@ -356,6 +437,54 @@ mod tests {
                 ..place
             };
             assert_eq!(curve.at(place), shifted.at(there));
+        }
+    }
+
+    #[test]
+    fn an_inserted_knot_changes_the_curve_by_rounding_only_and_far_places_not_at_all() {
+        let intervals = (0..14).map(|i| 0.5 + f64::from(i * i % 7)).collect();
+        let controls = (0..13).map(|j| [f64::from(j), f64::from(j * j % 5)]);
+        let curve = Curve::new(intervals, controls.collect()).unwrap();
+        let at = Place {
+            span: 4,
+            offset: 0.5,
+        };
+        let inserted = curve.insert_knot(at).unwrap();
+        assert_eq!(inserted.curve.spans(), curve.spans() + 1);
+        for place in places(&curve) {
+            let (p, q) = (curve.at(place), inserted.curve.at(inserted.place(place)));
+            // a few roundings of numbers of size 8
+            assert!((p[0] - q[0]).abs() < 1e-14 && (p[1] - q[1]).abs() < 1e-14);
+            if !(2..=6).contains(&place.span) {
+                assert_eq!(p, q);
+            }
+        }
+        let knot = Place {
+            span: 4,
+            offset: 0.0,
+        };
+        assert_eq!(curve.insert_knot(knot), None);
+    }
+
+    #[test]
+    fn parts_keep_their_bits_and_the_curve_runs_backwards() {
+        let curve = wavy();
+        let part = curve.spans_of(2..4);
+        let back = curve.reversed();
+        for place in places(&curve) {
+            if (2..4).contains(&place.span) {
+                let there = Place {
+                    span: place.span - 2,
+                    ..place
+                };
+                assert_eq!(part.at(there), curve.at(place));
+            }
+            let mirrored = Place {
+                span: curve.spans() - 1 - place.span,
+                offset: curve.span_length(place.span) - place.offset,
+            };
+            let (p, q) = (curve.at(place), back.at(mirrored));
+            assert!((p[0] - q[0]).abs() < 1e-14 && (p[1] - q[1]).abs() < 1e-14);
         }
     }
 

@@ -3,6 +3,7 @@
 pub mod b_spline;
 pub mod banded;
 pub mod cubic_spline;
+pub mod curve_join;
 pub mod growing_qr;
 pub mod layout;
 pub mod least_squares;

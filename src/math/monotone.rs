@@ -26,6 +26,22 @@ pub fn slopes(steps: &[f64], rises: &[f64]) -> Vec<f64> {
         .collect()
 }
 
+/// The given slopes, brought into the disc of radius 3 on every piece of length 1: each takes the
+/// smallest factor of its two pieces, 0 beside a flat piece. Slopes that are in it stay, to the bit.
+///
+/// # Panics
+/// There are not as many slopes as rises and one.
+pub fn limited(rises: &[f64], slopes: &[f64]) -> Vec<f64> {
+    assert_eq!(slopes.len(), rises.len() + 1, "a slope at every point");
+    let limit = |piece: usize| limit(rises[piece], slopes[piece], slopes[piece + 1]);
+    let before = |i: usize| if i > 0 { limit(i - 1) } else { 1.0 };
+    let after = |i: usize| if i < rises.len() { limit(i) } else { 1.0 };
+    let limited = slopes.iter().enumerate();
+    limited
+        .map(|(i, slope)| slope * before(i).min(after(i)))
+        .collect()
+}
+
 /// The three-point slope, 0 where the secants disagree in sign.
 fn start_slope(steps: &[f64], secants: &[f64], i: usize) -> f64 {
     let n = secants.len() + 1;
@@ -120,6 +136,15 @@ mod tests {
     fn a_flat_piece_and_an_extremum_have_slope_zero() {
         let slopes = slopes(&[1.0; 4], &[1.0, 0.0, 1.0, -1.0]);
         assert_eq!(slopes[1..4], [0.0; 3]);
+    }
+
+    #[test]
+    fn given_slopes_are_limited_only_where_they_must() {
+        let rises = [1.0, 1.0, 1.0, 0.0];
+        let given = [1.0, 1.5, 9.0, 1.0, 1.0];
+        let slopes = limited(&rises, &given);
+        assert_eq!((slopes[0], slopes[4]), (given[0], 0.0));
+        assert!(slopes[2] < 3.0 && slopes[3] == 0.0);
     }
 
     #[test]

@@ -109,6 +109,31 @@ impl TimeSignal {
         TimeSignal::new(curve, places, slopes, Vec::new())
     }
 
+    /// The same signal after one more change of time; a reversal undoes a reversal.
+    ///
+    /// # Errors
+    /// The warp asks for times outside \[1, n\].
+    pub fn with_warp(&self, warp: Warp) -> Result<Self, TimeError> {
+        let mut warps = self.warps.clone();
+        match (&warp, warps.last()) {
+            (Warp::Reverse { .. }, Some(Warp::Reverse { .. })) => {
+                warps.pop();
+            }
+            _ => warps.push(warp),
+        }
+        let (curve, places, slopes) = (&self.curve, &self.places, &self.slopes);
+        TimeSignal::new(curve.clone(), places.clone(), slopes.clone(), warps)
+    }
+
+    /// The same frames and changes of time on another curve of as many spans of the same lengths.
+    ///
+    /// # Errors
+    /// A frame's place is not on it.
+    pub fn with_curve(&self, curve: Curve) -> Result<Self, TimeError> {
+        let (places, slopes, warps) = (&self.places, &self.slopes, &self.warps);
+        TimeSignal::new(curve, places.clone(), slopes.clone(), warps.clone())
+    }
+
     /// How many frames there are: t runs over \[1, n\].
     pub fn frames(&self) -> usize {
         self.warps.last().map_or(self.places.len(), Warp::frames)

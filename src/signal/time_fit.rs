@@ -12,9 +12,10 @@
 //! the natural interpolating spline. n counts distinct consecutive positions.
 
 use super::time::{TimeError, TimeSignal};
-use crate::math::b_spline::{Curve, Place, Point, basis, basis_derivatives};
+use crate::math::b_spline::{Curve, Place, Point, basis};
 use crate::math::banded::BandedQr;
 use crate::math::cubic_spline::{CubicSpline, Ends};
+use crate::math::curve_join::bending;
 
 /// Weight of the bending term relative to the squared norms of both terms' matrices.
 const BENDING: f64 = 1e-8;
@@ -254,7 +255,9 @@ fn approximate(positions: &[Point], places: &[Place], knots: &[f64]) -> Option<C
                 )
             })
             .collect(),
-        bends: (0..spans).map(|span| bending(&intervals, span)).collect(),
+        bends: (0..spans)
+            .map(|span| bending(around(&intervals, span)))
+            .collect(),
     };
     let reach = FAR * largest(&offsets);
     let mut controls = system.solve(&offsets, BENDING)?;
@@ -276,7 +279,7 @@ fn largest(points: &[Point]) -> f64 {
 /// Rows of the frames (first control point, weights), and of each span's bending.
 struct System {
     rows: Vec<(usize, [f64; 4])>,
-    bends: Vec<[[f64; 4]; 2]>,
+    bends: Vec<Vec<[f64; 4]>>,
 }
 
 impl System {
@@ -298,19 +301,6 @@ impl System {
         }
         qr.solve().ok()
     }
-}
-
-/// Two rows whose squares sum to the integral of |f''|^2 over a span, f'' being linear there from a to
-/// b: length/3 (a^2 + a b + b^2) = length/3 ((a + b/2)^2 + 3/4 b^2).
-fn bending(intervals: &[f64], span: usize) -> [[f64; 4]; 2] {
-    let length = intervals[span + 2];
-    let second = |x: f64| basis_derivatives(around(intervals, span), x)[1];
-    let (a, b) = (second(0.0), second(length));
-    let root = (length / 3.0).sqrt();
-    [
-        [0, 1, 2, 3].map(|i| root * (a[i] + 0.5 * b[i])),
-        b.map(|b| root * 0.75_f64.sqrt() * b),
-    ]
 }
 
 #[cfg(test)]
