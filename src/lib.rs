@@ -44,4 +44,5 @@ pub mod inbox;
 pub mod io;
 pub mod pipeline;
 pub mod recipe;
+pub mod script;
 pub mod tui;

@@ -45,6 +45,15 @@ impl Task {
         Arc::clone(&self.cancel)
     }
 
+    /// A task of its own, to be cancelled by itself, that reports to the same observer.
+    #[must_use]
+    pub fn sibling(&self) -> Self {
+        Task {
+            cancel: Arc::default(),
+            observer: self.observer.clone(),
+        }
+    }
+
     /// Asks the work to stop; it ends with [`Cancelled`] at its next check.
     pub fn cancel(&self) {
         self.cancel.store(true, Ordering::Relaxed);

@@ -27,7 +27,7 @@ impl Seam {
         let jumps = differences(&velocities);
         let norms = |all: &[Vec<f64>]| all.iter().map(|v| norm(v)).collect::<Vec<_>>();
         // A difference that starts at frame i (from 0) reaches over its order.
-        let touches = |i: usize, order: usize| i + 1 <= last && i + 1 + order >= first;
+        let touches = |i: usize, order: usize| i < last && i + 1 + order >= first;
         Seam {
             step: ratio(&norms(&steps), |i| touches(i, 1)),
             velocity: ratio(&norms(&jumps), |i| touches(i, 1)),

@@ -3,9 +3,11 @@
 mod alive;
 mod cache;
 mod disk;
+mod outbox;
 mod watch;
 
 pub use alive::abandon_stages;
 pub use cache::Cache;
 pub use disk::Disk;
+pub use outbox::{Outbox, listing};
 pub use watch::{Depth, Wake, Watch};

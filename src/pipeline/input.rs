@@ -122,6 +122,16 @@ impl Files {
     }
 }
 
+/// The files that `spec` stands for, in the order of the frames, and its mesh.
+///
+/// # Errors
+/// As [`super::open`], as far as names tell.
+pub fn files(world: &dyn World, spec: &InputSpec) -> Result<Vec<PathBuf>> {
+    let mut paths = find(world, spec)?.paths;
+    paths.extend(spec.mesh.clone());
+    Ok(paths)
+}
+
 /// Finds the files that `spec` stands for.
 pub(super) fn find(world: &dyn World, spec: &InputSpec) -> Result<Files> {
     match spec.paths.as_slice() {

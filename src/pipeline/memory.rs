@@ -26,12 +26,22 @@ pub trait Remembered: Any + Send + Sync + Sized {
 }
 
 /// How a result came to be.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Made {
     /// It was made now.
     Computed,
     /// It was in memory or in the store.
     Remembered,
+}
+
+impl std::fmt::Display for Made {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Made::Computed => "computed",
+            Made::Remembered => "remembered",
+        })
+    }
 }
 
 struct Entry {

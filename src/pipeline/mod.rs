@@ -1,5 +1,6 @@
 //! The operations that the command line, recipes and the studio all call, over a World and a Task.
 
+mod deliver;
 mod frames;
 mod input;
 mod key;
@@ -10,15 +11,25 @@ mod open;
 mod output;
 mod picture;
 pub mod plot;
+mod request;
 mod save;
 mod sheet;
+mod value;
+mod workbench;
 
-pub use input::{FrameRange, InputSpec};
+pub use deliver::{deliver, plan_delivery};
+pub use input::{FrameRange, InputSpec, files};
 pub use key::{Key, KeyBuilder};
 pub use loom::{is_loom, open_loom, save_loom};
 pub use memory::{Made, Memory, Remembered};
 pub use open::{Capture, Content, Origin, open};
 pub use output::{Output, Plan, plan};
 pub use picture::{PictureFormat, save_picture};
+pub use request::FitRequest;
 pub use save::{Saved, save};
 pub use sheet::contact_sheet;
+pub use value::{Frames, Keyed, LoomValue, Picture, Shape, ShapeValue, Source, Value};
+pub use workbench::{Step, Workbench};
+
+pub use crate::edit::Edit;
+pub use crate::sample::Times;

@@ -1,6 +1,8 @@
 //! A recipe as text and as a run, without the language it is written in.
 
 mod param;
+mod run;
 pub mod text;
 
 pub use param::{Param, Setting};
+pub use run::{Failure, Input, Outcome, Recipe, Request, Runner, Save};
