@@ -6,15 +6,18 @@ use clap::builder::PossibleValuesParser;
 use serde_json::{Value, json};
 
 use super::fit;
+use super::recipes;
 use super::report;
+use super::runs::Runs;
 use super::session::{Outcome, Session};
-use crate::demo::{DEMOS, Demo};
+use crate::demo::{DEMOS, Demo, Kind};
 use crate::diag::Result;
 use crate::loom::fit::FitOptions;
 use crate::mesh::FrameSource;
 use crate::pipeline::plot::save_plot;
 use crate::pipeline::{self, contact_sheet, save_picture};
 use crate::plot::Theme;
+use crate::recipe::{Input, Request};
 use crate::sample::{Sampled, Times};
 use crate::signal::root::RootKind;
 
@@ -71,7 +74,8 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<Outcome> {
         )?,
     ];
     let outputs = saved.into_iter().flat_map(|saved| saved.outputs);
-    let outputs: Vec<PathBuf> = outputs.collect();
+    let mut outputs: Vec<PathBuf> = outputs.collect();
+    outputs.extend(played_on(demo, &files.played_on, session)?);
     Ok(Outcome {
         object: json!({
             "demo": demo.name,
@@ -91,12 +95,30 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<Outcome> {
     })
 }
 
+/// Runs the stock recipe that lets a motion go on. Poses are no motion.
+fn played_on(demo: &Demo, folder: &Path, session: &Session) -> Result<Vec<PathBuf>> {
+    if demo.kind == Kind::Poses {
+        return Ok(Vec::new());
+    }
+    let name = if demo.travels { "longer-walk" } else { "loop" };
+    let recipe = recipes::find(session.world(), Path::new(name))?;
+    let request = Request {
+        input: Some(Input::Demo(demo.name.to_string())),
+        ..Request::default()
+    };
+    let runs = Runs::new();
+    let outcome = runs.run(&recipe, &request, None, &session.task);
+    let outcome = outcome.map_err(|failure| failure.diagnostic)?;
+    runs.write(&outcome, Some(folder), &request, &session.task)
+}
+
 /// Where a demo's results go.
 struct Files {
     loom: PathBuf,
     map: PathBuf,
     sheet: PathBuf,
     frames: PathBuf,
+    played_on: PathBuf,
 }
 
 impl Files {
@@ -107,6 +129,7 @@ impl Files {
             map: file(".png"),
             sheet: file("-frames.png"),
             frames: folder.join("frames"),
+            played_on: folder.join("played-on"),
         }
     }
 
@@ -115,6 +138,7 @@ impl Files {
             (&self.map, "its map of poses and its time signals"),
             (&self.sheet, "what it looks like"),
             (&self.frames, "its frames at twice the rate"),
+            (&self.played_on, "a motion played on by a stock recipe"),
             (
                 &self.loom,
                 "the loom, for `meshloom sample` and `meshloom plot`",

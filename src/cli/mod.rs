@@ -8,7 +8,9 @@ mod args;
 mod interrupt;
 mod print;
 mod progress;
+mod recipes;
 mod report;
+mod runs;
 mod session;
 mod threads;
 
@@ -22,7 +24,9 @@ mod info;
 mod man;
 mod open;
 mod plot;
+mod run;
 mod sample;
+mod watch;
 
 use std::process::ExitCode;
 
@@ -57,6 +61,8 @@ commands! {
     fit Fit,
     sample Sample,
     open Open,
+    run Run,
+    watch Watch,
     compare Compare,
     info Info,
     convert Convert,

@@ -81,6 +81,19 @@ impl Session {
         warned.unpack(&mut self.warnings.borrow_mut())
     }
 
+    /// Keeps warnings for the end of the run.
+    pub(super) fn warn(&self, warnings: &[Diagnostic]) {
+        self.warnings.borrow_mut().extend_from_slice(warnings);
+    }
+
+    /// Prints one event as a line of JSON, where that was asked for.
+    pub(super) fn event(&self, event: &Value) {
+        if self.json {
+            // Where stdout is closed, nobody reads events any more.
+            let _ = print::object(event);
+        }
+    }
+
     /// The files of this machine.
     pub(super) fn world(&self) -> &dyn World {
         &Disk

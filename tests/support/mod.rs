@@ -61,6 +61,24 @@ impl Run {
             .unwrap_or_else(|error| panic!("{error} in {:?}, stderr: {}", self.stdout, self.stderr))
     }
 
+    /// The run has to have failed with exit code 1 and a message with all these parts.
+    #[track_caller]
+    pub fn fails_with_any(&self, parts: &[&str]) {
+        assert_eq!(self.code, Some(1), "stderr: {}", self.stderr);
+        for part in parts {
+            assert!(
+                self.stderr.contains(part),
+                "no {part:?} in: {}",
+                self.stderr
+            );
+        }
+        assert!(
+            self.stderr.contains("error: "),
+            "no error in: {}",
+            self.stderr
+        );
+    }
+
     /// The run has to have failed with exit code 1, a message with all these parts, and a hint.
     #[track_caller]
     pub fn fails_with(&self, parts: &[&str]) {
@@ -96,6 +114,67 @@ pub fn subcommands() -> Vec<String> {
         .filter(|name| *name != "help")
         .map(String::from)
         .collect()
+}
+
+/// A run that goes on, its JSON lines one by one. It ends with the value.
+pub struct Lines {
+    child: std::process::Child,
+    lines: std::sync::mpsc::Receiver<Value>,
+}
+
+impl Lines {
+    /// Starts the command.
+    pub fn of(mut command: Command) -> Self {
+        let mut child = command
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("the binary starts");
+        let stdout = child.stdout.take().expect("a pipe");
+        let (sender, lines) = std::sync::mpsc::channel();
+        std::thread::spawn(move || {
+            for line in
+                std::io::BufRead::lines(std::io::BufReader::new(stdout)).map_while(Result::ok)
+            {
+                let value = serde_json::from_str(&line)
+                    .unwrap_or_else(|error| panic!("{error} in {line:?}"));
+                if sender.send(value).is_err() {
+                    return;
+                }
+            }
+        });
+        Lines { child, lines }
+    }
+
+    /// The next line; `None` when none comes for a long time or the run has ended.
+    pub fn next(&mut self) -> Option<Value> {
+        self.lines
+            .recv_timeout(std::time::Duration::from_secs(60))
+            .ok()
+    }
+
+    /// The next line that `wanted` accepts.
+    pub fn find(&mut self, wanted: impl Fn(&Value) -> bool) -> Option<Value> {
+        std::iter::from_fn(|| self.next()).find(|line| wanted(line))
+    }
+
+    /// Whether the run has ended by itself.
+    pub fn ended(&mut self) -> bool {
+        self.child.try_wait().expect("the child is ours").is_some()
+    }
+
+    /// Ends the run without a warning, as a power cut would.
+    pub fn kill(mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+impl Drop for Lines {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
 }
 
 /// The names of an object's entries, sorted.
