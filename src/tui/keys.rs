@@ -132,7 +132,7 @@ pub(super) fn named(key: KeyEvent) -> Option<String> {
             prefix.push_str(word);
         }
     }
-    Some(prefix + &name)
+    Some(format!("{prefix}{name}"))
 }
 
 /// Actions whose words contain all letters of `typed` in order, those that have them closest together
