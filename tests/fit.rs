@@ -483,9 +483,7 @@ fn a_loom_plays_its_capture_in_every_space() {
         space: "quaternions".to_string(),
         ..given(14, 12, 11)
     };
-    let error = fit::fit(&sequence, &options, &Task::default())
-        .err()
-        .expect("a refusal");
+    let error = fit::fit(&sequence, &options, &Task::default()).expect_err("a refusal");
     assert!(error.message.contains("no space `quaternions`"), "{error}");
 }
 
