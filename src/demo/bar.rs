@@ -3,17 +3,14 @@
 //! The rest pose is the box \[0, 4\] x \[-1/4, 1/4\]^2 along x. Under a bend by angle b and a twist by
 //! angle w the axis becomes an arc of length 4 that turns by b towards +y, its cross-sections stay
 //! squares at right angles to it, and the section at arc length s is turned by w s / 4 about the
-//! axis. So with a = b s / 4 and the section's turned coordinates (u, v)
-//!
-//! ```text
-//! x = 4/b sin(a) - u sin(a)      y = 4/b (1 - cos(a)) + u cos(a)      z = v
-//! ```
+//! axis.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
 
 use crate::mesh::{Sequence, Topology};
 
+use super::bend::bent;
 use super::lattice::Lattice;
 
 const LENGTH: f64 = 4.0;
@@ -52,7 +49,9 @@ fn angles(frame: usize) -> (f64, f64) {
 /// straight bar. Bends of any size are allowed, beyond 2 pi the bar meets itself.
 pub fn pose(bend: f64, twist: f64) -> Vec<f32> {
     let points = LATTICE.surface_points();
-    let place = |point: [usize; 3]| bent(rest(point), bend, twist).map(|value| value as f32);
+    let place = |point: [usize; 3]| {
+        bent(rest(point), bend / LENGTH, twist / LENGTH).map(|value| value as f32)
+    };
     points.into_iter().flat_map(place).collect()
 }
 
@@ -63,25 +62,4 @@ fn rest(point: [usize; 3]) -> [f64; 3] {
         WIDTH * (share(1) - 0.5),
         WIDTH * (share(2) - 0.5),
     ]
-}
-
-fn bent([s, y, z]: [f64; 3], bend: f64, twist: f64) -> [f64; 3] {
-    let turn = twist * s / LENGTH;
-    let (sin, cos) = (libm::sin(turn), libm::cos(turn));
-    let (u, v) = (cos * y - sin * z, sin * y + cos * z);
-    let angle = bend * s / LENGTH;
-    let (sin, cos) = (libm::sin(angle), libm::cos(angle));
-    // chord of the arc: 2 sin(angle/2) / bend, in the direction of angle/2
-    let chord = s * sinc(0.5 * angle);
-    let (half_sin, half_cos) = (libm::sin(0.5 * angle), libm::cos(0.5 * angle));
-    [chord * half_cos - u * sin, chord * half_sin + u * cos, v]
-}
-
-/// sin(x) / x, also at 0.
-fn sinc(x: f64) -> f64 {
-    if x.abs() < 1e-8 {
-        1.0
-    } else {
-        libm::sin(x) / x
-    }
 }

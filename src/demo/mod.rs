@@ -4,9 +4,13 @@
 //! the platform's own sine or a thread pool, so that two machines agree to the last bit.
 
 mod bar;
+mod bend;
+mod cactus;
 mod curve;
+mod flag;
 mod horse;
 mod implicit;
+mod jelly;
 mod lattice;
 mod skin;
 mod surface_nets;
@@ -60,12 +64,36 @@ pub const DEMOS: &[Demo] = &[
         generate: horse::walk,
     },
     Demo {
+        name: "flag",
+        about: "a flag waves in the wind, simulated cloth",
+        kind: Kind::Motion,
+        travels: false,
+        view: [0.5, 0.2],
+        generate: flag::generate,
+    },
+    Demo {
+        name: "jelly",
+        about: "a rabbit of jelly is lifted by its back and dropped",
+        kind: Kind::Motion,
+        travels: false,
+        view: [0.5, 0.2],
+        generate: jelly::generate,
+    },
+    Demo {
         name: "bar",
         about: "a square bar bends to 170 degrees, twists by half a turn, then does both",
         kind: Kind::Motion,
         travels: false,
         view: [0.4, 0.3],
         generate: bar::generate,
+    },
+    Demo {
+        name: "cactus",
+        about: "three poses of a cactus, bent to the left, to the front and to the right",
+        kind: Kind::Poses,
+        travels: false,
+        view: [0.3, 0.2],
+        generate: cactus::generate,
     },
 ];
 

@@ -1,10 +1,5 @@
-use crate::demo::Demo;
-use crate::demo::tests::{is_closed_manifold, smallest_face_share};
-use crate::mesh::{FrameSource, Sequence};
-
-fn capture(name: &str) -> Sequence {
-    (Demo::find(name).unwrap().generate)()
-}
+use crate::demo::tests::{capture, is_closed_manifold, smallest_face_share};
+use crate::mesh::FrameSource;
 
 /// Mean distance of corresponding vertices.
 fn distance(a: &[f32], b: &[f32]) -> f64 {
