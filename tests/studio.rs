@@ -211,6 +211,44 @@ fn frames_and_pictures_are_written_where_the_studio_was_opened() {
 }
 
 #[test]
+fn a_demo_is_fitted_while_it_is_looked_at() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut screen = Screen::open(folder.path(), &["demo", "bar"], (100, 30));
+    screen.wait("k=");
+    screen.press(":");
+    screen.wait("find an action");
+    screen.press("last");
+    screen.wait("to the last frame");
+    screen.press("\r");
+    screen.wait_until("the last frame", |screen| {
+        !screen.contents().contains("frame 1.00/")
+    });
+    screen.press("q");
+    assert_eq!(screen.ended(), 0);
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn pictures_are_sent_to_a_terminal_that_is_said_to_show_them() {
+    let folder = folder();
+    let arguments = ["open", "bar.loom", "--graphics", "kitty"];
+    let mut screen = Screen::open(folder.path(), &arguments, (120, 36));
+    // What stands on the pictures is text; the pictures themselves this terminal passes over.
+    screen.wait("f(t) =");
+    screen.press("q");
+    assert_eq!(screen.ended(), 0);
+}
+
+#[test]
+fn doctor_says_what_was_asked_and_why_half_blocks_were_chosen() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut screen = Screen::open(folder.path(), &["doctor"], (160, 60));
+    screen.wait("nothing within 200 ms");
+    screen.wait("\\u{1b}[c");
+    assert_eq!(screen.ended(), 0);
+}
+
+#[test]
 fn a_missing_capture_is_said_and_nothing_else_happens() {
     let folder = tempfile::tempdir().unwrap();
     let mut screen = Screen::open(folder.path(), &["open", "gone.loom"], (80, 24));

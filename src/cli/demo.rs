@@ -5,11 +5,10 @@ use std::path::{Path, PathBuf};
 use clap::builder::PossibleValuesParser;
 use serde_json::{Value, json};
 
-use super::fit;
-use super::recipes;
 use super::report;
 use super::runs::Runs;
 use super::session::{Outcome, Session};
+use super::{fit, open, recipes};
 use crate::demo::{DEMOS, Demo, Kind};
 use crate::diag::Result;
 use crate::loom::fit::FitOptions;
@@ -26,7 +25,7 @@ const RATE: f64 = 2.0;
 /// Frames on the contact sheet.
 const SHEET: usize = 24;
 
-/// Fit a built-in capture; write frames at twice its rate and pictures
+/// Look at a built-in capture; without a terminal, fit it and write frames at twice its rate and pictures
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// Which capture
@@ -37,24 +36,28 @@ pub(super) struct Args {
     #[arg(long)]
     list: bool,
 
-    /// The folder to write into
-    #[arg(long, value_name = "DIR", default_value = "meshloom-demo")]
-    write: PathBuf,
+    /// Write the loom, its frames and pictures to this folder
+    /// [default without a terminal, or with --json: meshloom-demo]
+    #[arg(long, value_name = "DIR")]
+    write: Option<PathBuf>,
 }
+
+/// Where a demo is written unless a folder is named.
+const FOLDER: &str = "meshloom-demo";
 
 pub(super) fn run(args: &Args, session: &Session) -> Result<Outcome> {
     if args.list {
         return Ok(list(session));
     }
     let demo = Demo::find(&args.name).unwrap_or(&DEMOS[0]);
+    if args.write.is_none() && !session.json && open::at_a_terminal() {
+        return open::demo(demo, session);
+    }
+    let folder = args.write.as_deref().unwrap_or(Path::new(FOLDER));
     session.task.phase("load", 0);
     let capture = (demo.generate)();
-    let options = FitOptions {
-        root: demo.travels.then_some(RootKind::Ground),
-        ..FitOptions::default()
-    };
-    let loom = fit::fitted(session, &capture, &options)?;
-    let files = Files::of(demo, &args.write);
+    let loom = fit::fitted(session, &capture, &options(demo))?;
+    let files = Files::of(demo, folder);
     let frames = Sampled::new(
         loom.clone(),
         Times::Rate(RATE).over(loom.frames(), loom.fps())?,
@@ -149,6 +152,14 @@ impl Files {
             .each_ref()
             .map(|(path, what)| (path.as_str(), what.clone()));
         report::table(session.style, "written", &rows)
+    }
+}
+
+/// How a demo is fitted.
+pub(super) fn options(demo: &Demo) -> FitOptions {
+    FitOptions {
+        root: demo.travels.then_some(RootKind::Ground),
+        ..FitOptions::default()
     }
 }
 

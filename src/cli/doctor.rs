@@ -1,5 +1,5 @@
-//! `meshloom doctor`: what this machine and this terminal offer, as far as it can be known without
-//! asking the terminal itself.
+//! `meshloom doctor`: what this machine and this terminal offer, and what the terminal answers when it is
+//! asked.
 
 use std::io::{self, IsTerminal};
 
@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 
 use super::session::{Outcome, Session};
 use crate::diag::Result;
+use crate::tui;
 
 /// Say what this machine and this terminal offer
 #[derive(Debug, clap::Args)]
@@ -14,11 +15,16 @@ pub(super) struct Args {}
 
 pub(super) fn run(_: &Args, session: &Session) -> Result<Outcome> {
     let machine = machine(session);
-    let terminal = terminal(session);
+    let (terminal, pictures) = (terminal(session), pictures());
     let mut report = section(session, "machine", &machine);
     report.push_str(&section(session, "terminal", &terminal));
+    report.push_str(&section(session, "pictures", &pictures));
     Ok(Outcome {
-        object: json!({ "machine": object(&machine), "terminal": object(&terminal) }),
+        object: json!({
+            "machine": object(&machine),
+            "terminal": object(&terminal),
+            "pictures": object(&pictures),
+        }),
         report,
         ..Outcome::default()
     })
@@ -75,6 +81,31 @@ fn terminal(session: &Session) -> Facts {
         ("NO_COLOR", variable("NO_COLOR")),
         ("TMUX", variable("TMUX")),
         ("SSH_CONNECTION", variable("SSH_CONNECTION")),
+    ]
+}
+
+/// What the terminal is asked and answers, and how the studio would show pictures.
+fn pictures() -> Facts {
+    if !(io::stdin().is_terminal() && io::stdout().is_terminal()) {
+        let reason = "not asked: stdin or stdout is no terminal";
+        return vec![("graphics", Value::Null), ("because", json!(reason))];
+    }
+    let given = |name| std::env::var(name).is_ok_and(|value| !value.is_empty());
+    let answers = tui::ask();
+    let choice = tui::choose(None, &answers, given("TMUX"), !given("NO_COLOR"));
+    let cell = answers
+        .cell
+        .map(|(width, height)| format!("{width} x {height} pixels"));
+    let background = answers
+        .background
+        .map(|[r, g, b]| format!("#{r:02x}{g:02x}{b:02x}"));
+    vec![
+        ("asked", json!(tui::QUERY.escape_default().to_string())),
+        ("answered", json!(answers.bytes.escape_ascii().to_string())),
+        ("background", json!(background)),
+        ("cell", json!(cell)),
+        ("graphics", json!(choice.protocol.name())),
+        ("because", json!(choice.reason)),
     ]
 }
 

@@ -5,9 +5,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::args::{Input, positive};
+use super::demo;
 use super::session::{Outcome, Session};
+use crate::demo::Demo;
 use crate::diag::{Diagnostic, Result, Warned};
 use crate::io::Disk;
+use crate::loom::fit::FitOptions;
 use crate::mesh::{FrameSource, Sequence};
 use crate::pipeline::{self, Content, FrameRange, InputSpec, Output};
 use crate::task::Task;
@@ -27,9 +30,9 @@ pub(super) struct Args {
     #[arg(long, value_name = "RATE", value_parser = positive)]
     fps: Option<f64>,
 
-    /// How pictures are shown
-    #[arg(long, value_name = "HOW", value_parser = protocol, default_value = "blocks")]
-    graphics: Protocol,
+    /// How pictures are shown: kitty, blocks, braille, ascii [default: as the terminal says it can]
+    #[arg(long, value_name = "HOW", value_parser = protocol)]
+    graphics: Option<Protocol>,
 }
 
 fn protocol(name: &str) -> Result<Protocol, String> {
@@ -44,11 +47,26 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<Outcome> {
     refuse_pipes()?;
     let spec = args.input.part.of(&args.input.inputs, args.fps);
     let name = title(&args.input.inputs);
-    let options = options(name.clone(), args.graphics);
-    let files = Arc::new(OnDisk { spec, name });
+    let source = Source::Disk(spec);
+    studio(Shown { source, name }, args.graphics, session)
+}
+
+/// The studio on a built-in capture.
+pub(super) fn demo(demo: &'static Demo, session: &Session) -> Result<Outcome> {
+    let (source, name) = (Source::Demo(demo), demo.name.to_string());
+    studio(Shown { source, name }, None, session)
+}
+
+fn studio(shown: Shown, graphics: Option<Protocol>, session: &Session) -> Result<Outcome> {
+    let options = options(shown.name.clone(), graphics);
     session.progress.end();
-    tui::run(&options, files, &session.task)?;
+    tui::run(&options, Arc::new(shown), &session.task)?;
     Ok(Outcome::default())
+}
+
+/// Whether there is a keyboard and a screen.
+pub(super) fn at_a_terminal() -> bool {
+    refuse_pipes().is_ok()
 }
 
 /// The studio needs a keyboard and a screen.
@@ -73,24 +91,29 @@ fn title(inputs: &[PathBuf]) -> String {
     inputs.first().map_or_else(String::new, |path| name(path))
 }
 
-fn options(name: String, graphics: Protocol) -> Options {
+fn options(name: String, graphics: Option<Protocol>) -> Options {
     let variable = |name| std::env::var(name).unwrap_or_default();
     Options {
         name,
         graphics,
-        dark: true,
+        tmux: !variable("TMUX").is_empty(),
         colour: variable("NO_COLOR").is_empty() && variable("TERM") != "dumb",
         true_colour: matches!(variable("COLORTERM").as_str(), "truecolor" | "24bit"),
     }
 }
 
-/// The capture on disk, and the working directory for what is written.
-struct OnDisk {
-    spec: InputSpec,
+/// What is shown; the working directory takes what is written.
+struct Shown {
+    source: Source,
     name: String,
 }
 
-impl OnDisk {
+enum Source {
+    Disk(InputSpec),
+    Demo(&'static Demo),
+}
+
+impl Shown {
     /// The first of `STEM-1ENDING`, `STEM-2ENDING`, .. that is not there yet.
     fn fresh(&self, stem: &str, ending: &str) -> PathBuf {
         let named = |number| PathBuf::from(format!("{stem}-{number}{ending}"));
@@ -102,16 +125,19 @@ impl OnDisk {
     }
 }
 
-impl Files for OnDisk {
+impl Files for Shown {
     fn first(&self, task: &Task) -> Result<Option<Sequence>> {
-        let start = self.spec.range.and_then(|range| range.first).unwrap_or(1);
+        let Source::Disk(spec) = &self.source else {
+            return Ok(None);
+        };
+        let start = spec.range.and_then(|range| range.first).unwrap_or(1);
         let range = FrameRange {
             first: Some(start),
             last: Some(start),
         };
         let spec = InputSpec {
             range: Some(range),
-            ..self.spec.clone()
+            ..spec.clone()
         };
         Ok(match pipeline::open(&Disk, &spec, task)?.output.content {
             Content::Sequence(sequence) => Some(sequence),
@@ -120,18 +146,26 @@ impl Files for OnDisk {
     }
 
     fn open(&self, task: &Task) -> Result<Warned<Opened>> {
-        let capture = pipeline::open(&Disk, &self.spec, task)?;
+        let spec = match &self.source {
+            Source::Disk(spec) => spec,
+            Source::Demo(demo) => {
+                let options = demo::options(demo);
+                let capture = Opened::Capture((demo.generate)(), options);
+                return Ok(Warned::clean(capture));
+            }
+        };
+        let capture = pipeline::open(&Disk, spec, task)?;
         let opened = match &capture.output.content {
-            Content::Sequence(sequence) => Opened::Capture(sequence.clone()),
-            Content::Loom(_) if self.spec.range.is_some() => {
+            Content::Sequence(sequence) => Opened::Capture(sequence.clone(), FitOptions::default()),
+            Content::Loom(_) if spec.range.is_some() => {
                 return Diagnostic::error("a range is for captures, and this is a loom")
-                    .in_file(&self.spec.paths[0])
+                    .in_file(&spec.paths[0])
                     .hint("leave --range out, and mark a loop with [ and ]")
                     .err();
             }
             Content::Loom(sampled) => {
                 let loom = sampled.loom();
-                let fps = self.spec.fps.or(loom.fps());
+                let fps = spec.fps.or(loom.fps());
                 Opened::Loom(Arc::new(loom.with_fps(fps)?))
             }
         };
@@ -149,7 +183,11 @@ impl Files for OnDisk {
 
     fn export(&self, frames: &dyn FrameSource, task: &Task) -> Result<PathBuf> {
         let folder = self.fresh(&format!("{}-frames", stem_of(&self.name)), "");
-        let output = Output::from(folder.join("####.obj")).protecting(&self.spec.paths);
+        let inputs = match &self.source {
+            Source::Disk(spec) => spec.paths.as_slice(),
+            Source::Demo(_) => &[],
+        };
+        let output = Output::from(folder.join("####.obj")).protecting(inputs);
         pipeline::save(&Disk, frames, &output, task)?;
         Ok(folder)
     }

@@ -27,7 +27,7 @@ pub(super) struct Session {
     pub(super) progress: Arc<Progress>,
     pub(super) threads: Threads,
     pub(super) style: Style,
-    json: bool,
+    pub(super) json: bool,
     quiet: bool,
     warnings: RefCell<Vec<Diagnostic>>,
     last_word: LastWord,

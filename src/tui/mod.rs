@@ -22,6 +22,6 @@ mod theme;
 mod update;
 mod work;
 
-pub use graphics::Protocol;
+pub use graphics::{Answers, Choice, Protocol, QUERY, choose, read_answers};
 pub use studio::{Files, Opened, Options, run};
-pub use terminal::restore;
+pub use terminal::{ask, restore};

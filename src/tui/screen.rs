@@ -173,6 +173,7 @@ fn front(state: &State, title: &str, size: (u16, u16), buffer: &mut Buffer) -> R
     Block::bordered()
         .title(format!(" {title} "))
         .border_style(state.look.style(Role::Accent))
+        .style(state.look.front())
         .render(area, buffer);
     inner(area)
 }

@@ -13,7 +13,7 @@ use ratatui::crossterm::terminal::size;
 use ratatui::layout::Rect;
 
 use super::event::{Answer, Command, Event};
-use super::graphics::{Aside, Painter, Protocol, cell_size, painter};
+use super::graphics::{Aside, Painter, Protocol, cell_size, choose, painter};
 use super::screen;
 use super::state::{Content, Same, Scene, Signals, Span, State};
 use super::terminal;
@@ -64,8 +64,8 @@ pub trait Files: Send + Sync {
 
 /// What a file held.
 pub enum Opened {
-    /// Frames, to be fitted.
-    Capture(Sequence),
+    /// Frames, and how they are to be fitted.
+    Capture(Sequence, FitOptions),
     /// A loom.
     Loom(Arc<Loom>),
 }
@@ -75,10 +75,10 @@ pub enum Opened {
 pub struct Options {
     /// What stands in the status line.
     pub name: String,
-    /// How pictures are shown.
-    pub graphics: Protocol,
-    /// Whether the terminal's background is dark.
-    pub dark: bool,
+    /// How pictures are shown; none: as the terminal says it can.
+    pub graphics: Option<Protocol>,
+    /// Whether this runs within tmux.
+    pub tmux: bool,
     /// Whether colours are wanted.
     pub colour: bool,
     /// Whether the terminal has all colours, not 256.
@@ -96,17 +96,18 @@ pub fn run(options: &Options, files: Arc<dyn Files>, task: &Task) -> Result<()> 
         (true, false) => Depth::Indexed,
         (true, true) => Depth::True,
     };
-    let look = Look {
-        dark: options.dark,
-        depth,
-    };
-    let cell = cell_size(options.graphics);
+    terminal::take().map_err(lost)?;
+    let answers = terminal::ask();
+    let choice = choose(options.graphics, &answers, options.tmux, options.colour);
+    let dark = answers.background.is_none_or(is_dark);
+    let look = Look { dark, depth };
+    let cell = cell_size(choice.protocol, &answers);
     let state = State::new(options.name.clone(), screen, cell, look);
     let (send, receive) = mpsc::channel();
-    terminal::take().map_err(lost)?;
-    let mut studio = Studio::new(state, painter(options.graphics, look), files, send);
+    let mut studio = Studio::new(state, painter(choice.protocol, look), files, send);
     let ended = studio.run(&receive, task);
     studio.cancel.cancel();
+    studio.forget();
     terminal::restore();
     ended
 }
@@ -116,6 +117,12 @@ fn lost(error: io::Error) -> Box<Diagnostic> {
     Box::new(Diagnostic::error(format!(
         "the terminal cannot be used: {error}"
     )))
+}
+
+/// Whether light text stands out from this background more than dark text.
+fn is_dark([red, green, blue]: [u8; 3]) -> bool {
+    // BT.601, against the middle.
+    299 * u32::from(red) + 587 * u32::from(green) + 114 * u32::from(blue) < 128_000
 }
 
 struct Studio {
@@ -222,9 +229,11 @@ impl Studio {
         let mut bytes = Vec::new();
         if self.stale {
             self.shown = Buffer::empty(area);
+            self.painter.forget(&mut aside);
             bytes.extend_from_slice(b"\x1b[0m\x1b[2J");
         }
         screen::draw(&self.state, &mut *self.painter, &mut next, &mut aside);
+        self.painter.finish(&mut aside);
         let changes = self.shown.diff(&next);
         if changes.is_empty() && !self.stale && aside == Aside::default() {
             return Ok(());
@@ -236,6 +245,14 @@ impl Studio {
         bytes.extend(aside.after);
         (self.shown, self.stale) = (next, false);
         terminal::send(&bytes).map_err(lost)
+    }
+
+    /// Pictures leave the terminal.
+    fn forget(&mut self) {
+        let mut aside = Aside::default();
+        self.painter.forget(&mut aside);
+        // A terminal that is gone shows none.
+        let _ = terminal::send(&aside.before);
     }
 
     /// Keys, mouse, sizes and signals become events.
@@ -351,7 +368,7 @@ fn open(files: &dyn Files, events: &Sender<Event>, task: &Task) -> Result<()> {
     let mut warnings = Vec::new();
     let loom = match files.open(task)?.unpack(&mut warnings) {
         Opened::Loom(loom) => loom,
-        Opened::Capture(sequence) => {
+        Opened::Capture(sequence, options) => {
             if let Some(bounds) = box_of(&sequence)? {
                 let scene = Scene {
                     of: Same::new(sequence.clone()),
@@ -359,7 +376,7 @@ fn open(files: &dyn Files, events: &Sender<Event>, task: &Task) -> Result<()> {
                 };
                 say(Content::Capture(scene), std::mem::take(&mut warnings));
             }
-            let fitted = fit(&sequence, &FitOptions::default(), task)?;
+            let fitted = fit(&sequence, &options, task)?;
             Arc::new(fitted.unpack(&mut warnings))
         }
     };

@@ -5,6 +5,8 @@ use std::panic;
 use std::sync::Once;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
+#[cfg(unix)]
+use std::time::{Duration, Instant};
 
 use ratatui::crossterm::cursor::{Hide, Show};
 use ratatui::crossterm::event::{DisableMouseCapture, EnableMouseCapture};
@@ -12,6 +14,12 @@ use ratatui::crossterm::terminal::{
     EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode, enable_raw_mode,
 };
 use ratatui::crossterm::{execute, queue};
+
+use super::graphics::{Answers, read_answers};
+
+/// How long a terminal may take to answer; the last read can add a tenth of a second to half of it.
+#[cfg(unix)]
+const PATIENCE: Duration = Duration::from_millis(100);
 
 /// Whether the terminal is ours.
 static HELD: AtomicBool = AtomicBool::new(false);
@@ -74,4 +82,47 @@ pub(super) fn send(bytes: &[u8]) -> io::Result<()> {
     out.write_all(bytes)?;
     out.write_all(b"\x1b[?2026l")?;
     out.flush()
+}
+
+/// Asks the terminal what it can show. One that says nothing, or not enough, is waited for 200 ms.
+pub fn ask() -> Answers {
+    // A terminal that cannot be asked has said nothing.
+    read_answers(&exchange().unwrap_or_default())
+}
+
+/// The bytes that came back.
+#[cfg(unix)]
+fn exchange() -> io::Result<Vec<u8>> {
+    use rustix::termios::{OptionalActions, SpecialCodeIndex, tcgetattr, tcsetattr};
+    let keyboard = io::stdin();
+    let before = tcgetattr(&keyboard)?;
+    let mut waiting = before.clone();
+    waiting.make_raw();
+    // A read ends after a tenth of a second with what there is.
+    waiting.special_codes[SpecialCodeIndex::VMIN] = 0;
+    waiting.special_codes[SpecialCodeIndex::VTIME] = 1;
+    tcsetattr(&keyboard, OptionalActions::Now, &waiting)?;
+    let bytes = collect();
+    tcsetattr(&keyboard, OptionalActions::Now, &before)?;
+    bytes
+}
+
+#[cfg(unix)]
+fn collect() -> io::Result<Vec<u8>> {
+    let mut out = io::stdout();
+    out.write_all(super::graphics::QUERY.as_bytes())?;
+    out.flush()?;
+    let (start, mut bytes) = (Instant::now(), Vec::new());
+    let mut part = [0; 256];
+    while start.elapsed() < PATIENCE && !super::graphics::complete(&bytes) {
+        let length = rustix::io::read(io::stdin(), &mut part)?;
+        bytes.extend_from_slice(&part[..length]);
+    }
+    Ok(bytes)
+}
+
+/// Other systems' terminals are not asked.
+#[cfg(not(unix))]
+fn exchange() -> io::Result<Vec<u8>> {
+    Ok(Vec::new())
 }

@@ -55,6 +55,15 @@ impl Look {
         Style::new().fg(self.colour(if self.dark { dark } else { light }))
     }
 
+    /// What stands in front of pictures.
+    pub(super) fn front(self) -> Style {
+        let [red, green, blue, _] = self.plot(0.0).background.0;
+        match self.depth {
+            Depth::Mono => Style::new(),
+            _ => Style::new().bg(self.colour([red, green, blue])),
+        }
+    }
+
     /// A colour as this terminal shows it.
     pub(super) fn colour(self, rgb: [u8; 3]) -> Color {
         match self.depth {

@@ -13,9 +13,14 @@ use super::theme::Look;
 use crate::image::Image;
 use crate::loom::{Loom, Scratch};
 use crate::mesh::{Bounds, FrameSource, Sequence, Topology};
-use crate::plot::{Plane, Theme, pose_space, raster, time_signals};
+use crate::plot::{
+    self, Chart, Panel, Plane, Series, Theme, TimeSignals, Tint, chart, pose_space, raster,
+    time_signals,
+};
 use crate::view::{Camera, Renderer, Style, Surface, Wire};
 
+/// Plots without letters are drawn so many times as fine as they are shown.
+const COARSE: usize = 2;
 /// Opacity of the frames before and after.
 const SKIN: f32 = 0.22;
 /// How far away they are, in frames.
@@ -78,7 +83,9 @@ impl Brush {
     /// The picture of a wish.
     pub(super) fn paint(&mut self, wish: &Wish) -> Picture {
         let theme = wish.look.plot(wish.text);
-        let (width, height) = (wish.size.0 as f32, wish.size.1 as f32);
+        // Without letters there are few pixels: lines half a pixel thick show more of them.
+        let fine = if wish.text > 0.0 { 1 } else { COARSE };
+        let (width, height) = ((fine * wish.size.0) as f32, (fine * wish.size.1) as f32);
         match &wish.subject {
             Subject::Map {
                 signals,
@@ -87,18 +94,20 @@ impl Brush {
             } => {
                 let mut map = signals.0.map.clone();
                 (map.window, map.span) = (*window, *span);
-                let (scene, plane) = pose_space(&map, width, height, &theme);
-                Picture {
-                    image: raster(&scene, 1.0),
-                    planes: vec![plane],
+                if fine > 1 {
+                    map.frames.clear();
+                    map.reached.clear();
                 }
+                let (scene, plane) = pose_space(&map, width, height, &theme);
+                picture(&scene, vec![plane], fine)
+            }
+            Subject::Times(signals) if fine > 1 => {
+                let (scene, planes) = chart(&coarse(&signals.0.times), width, height, &theme);
+                picture(&scene, planes, fine)
             }
             Subject::Times(signals) => {
                 let (scene, planes) = time_signals(&signals.0.times, width, height, &theme);
-                Picture {
-                    image: raster(&scene, 1.0),
-                    planes,
-                }
+                picture(&scene, planes, fine)
             }
             Subject::Mesh(pose, view) => Picture {
                 image: self.mesh(pose, view, wish, &theme),
@@ -172,6 +181,59 @@ impl Brush {
             colours: None,
         };
         self.renderer.overlay(surface, camera, style, image);
+    }
+}
+
+/// A scene drawn finer than it is shown, and its planes in pixels that are shown.
+fn picture(scene: &plot::Scene, planes: Vec<Plane>, fine: usize) -> Picture {
+    let mut image = raster(scene, 1.0);
+    for _ in 1..fine {
+        image = image.halved();
+    }
+    let scale = 1.0 / fine as f32;
+    let planes = planes.into_iter().map(|plane| scaled(plane, scale));
+    Picture {
+        planes: planes.collect(),
+        image,
+    }
+}
+
+fn scaled(mut plane: Plane, scale: f32) -> Plane {
+    let area = plane.area;
+    plane.area = plot::Rect::new(
+        scale * area.left,
+        scale * area.top,
+        scale * area.width,
+        scale * area.height,
+    );
+    plane.x.pixels = plane.x.pixels.map(|pixel| scale * pixel);
+    plane.y.pixels = plane.y.pixels.map(|pixel| scale * pixel);
+    plane
+}
+
+/// The signals that can be read in few pixels: coordinates and speed.
+fn coarse(signals: &TimeSignals) -> Chart {
+    let line = |tint, values: &mut dyn Iterator<Item = f64>| {
+        let points = signals.times.iter().zip(values);
+        let points = points.map(|(&t, value)| [t, value]).collect();
+        Series::line("", Tint::Series(tint), points)
+    };
+    let coordinate = |axis: usize| line(2 * axis, &mut signals.position.iter().map(|p| p[axis]));
+    Chart {
+        range: signals.window,
+        panels: vec![
+            Panel {
+                series: vec![coordinate(0), coordinate(1)],
+                share: 1.6,
+                ..Panel::default()
+            },
+            Panel {
+                from_zero: true,
+                series: vec![line(3, &mut signals.speed.iter().copied())],
+                ..Panel::default()
+            },
+        ],
+        ..Chart::default()
     }
 }
 

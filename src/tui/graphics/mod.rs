@@ -4,10 +4,16 @@
 //! for a picture that has not changed.
 
 mod blocks;
+mod choice;
 mod dots;
+mod kitty;
+mod palette;
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
+
+pub use choice::{Answers, Choice, QUERY, choose, read_answers};
+pub(super) use choice::{cell_size, complete};
 
 use super::theme::Look;
 use crate::image::Image;
@@ -15,6 +21,8 @@ use crate::image::Image;
 /// How pictures are shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Protocol {
+    /// Kitty's: pixels.
+    Kitty,
     /// Half blocks: two colours a cell.
     Blocks,
     /// Braille: eight dots a cell.
@@ -25,11 +33,17 @@ pub enum Protocol {
 
 impl Protocol {
     /// All of them.
-    pub const ALL: [Protocol; 3] = [Protocol::Blocks, Protocol::Braille, Protocol::Ascii];
+    pub const ALL: [Protocol; 4] = [
+        Protocol::Kitty,
+        Protocol::Blocks,
+        Protocol::Braille,
+        Protocol::Ascii,
+    ];
 
     /// Its name on the command line.
     pub fn name(self) -> &'static str {
         match self {
+            Protocol::Kitty => "kitty",
             Protocol::Blocks => "blocks",
             Protocol::Braille => "braille",
             Protocol::Ascii => "ascii",
@@ -67,20 +81,18 @@ pub(super) trait Painter {
         buffer: &mut Buffer,
         aside: &mut Aside,
     );
-}
 
-/// The pixels of a cell in pictures of a protocol.
-pub(super) fn cell_size(protocol: Protocol) -> CellSize {
-    let (width, height) = match protocol {
-        Protocol::Blocks => (1, 2),
-        Protocol::Braille | Protocol::Ascii => (2, 4),
-    };
-    CellSize { width, height }
+    /// All pictures of a frame are painted: those that are not among them leave the screen.
+    fn finish(&mut self, _: &mut Aside) {}
+
+    /// The terminal is cleared, or given back: nothing that was sent is there any more.
+    fn forget(&mut self, _: &mut Aside) {}
 }
 
 /// The painter of a protocol.
 pub(super) fn painter(protocol: Protocol, look: Look) -> Box<dyn Painter> {
     match protocol {
+        Protocol::Kitty => Box::new(kitty::Kitty::default()),
         Protocol::Blocks => Box::new(blocks::Blocks(look)),
         Protocol::Braille => Box::new(dots::Braille(look)),
         Protocol::Ascii => Box::new(dots::Ascii(look)),

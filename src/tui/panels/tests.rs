@@ -11,7 +11,7 @@ use crate::loom::test_looms::ring;
 use crate::mesh::Bounds;
 use crate::pipeline::plot::plot_loom;
 use crate::tui::event::{Answer, Command, Event};
-use crate::tui::graphics::{Aside, Protocol, cell_size, painter};
+use crate::tui::graphics::{Aside, CellSize, Protocol, painter};
 use crate::tui::screen;
 use crate::tui::state::{Content, Front, Same, Scene, Signals, State};
 use crate::tui::theme::{Depth, Look};
@@ -23,9 +23,15 @@ const LOOK: Look = Look {
     depth: Depth::Mono,
 };
 
+/// As letters have them.
+const CELL: CellSize = CellSize {
+    width: 2,
+    height: 4,
+};
+
 /// A studio with a loom open on a screen of that size, all of its pictures drawn.
 fn studio(size: (u16, u16)) -> State {
-    let mut state = State::new("ring".into(), size, cell_size(Protocol::Ascii), LOOK);
+    let mut state = State::new("ring".into(), size, CELL, LOOK);
     let loom = ring(20, 15, false);
     let bounds = Bounds::of(&loom.at(1.0).unwrap()).unwrap();
     let (map, times) = plot_loom(&loom);
