@@ -19,19 +19,26 @@ pub(super) struct Indexed {
 }
 
 impl Indexed {
-    /// The picture with its own colours where there are at most 256, else with the 256 most frequent of
-    /// its colours rounded to 5 bits a channel. Alpha is ignored: panels are opaque.
+    /// The picture with its own colours where there are at most 256, else rounded to 7 or 6 bits a channel
+    /// where that makes it so, else with the 256 most frequent of those rounded to 5 bits. Alpha is
+    /// ignored: panels are opaque.
     pub(super) fn of(image: &Image) -> Self {
-        let colours = || {
-            image
-                .rgba
-                .as_chunks::<4>()
-                .0
-                .iter()
-                .map(|pixel| [pixel[0], pixel[1], pixel[2]])
-        };
-        exact(image, colours()).unwrap_or_else(|| reduced(image, colours()))
+        let pixels = image.rgba.as_chunks::<4>().0.iter();
+        let colours = pixels.map(|pixel| [pixel[0], pixel[1], pixel[2]]);
+        (0..3)
+            .find_map(|bits| {
+                let rounded = colours
+                    .clone()
+                    .map(|rgb| rgb.map(|value| round(value, bits)));
+                exact(image, rounded)
+            })
+            .unwrap_or_else(|| reduced(image, colours))
     }
+}
+
+/// A value without its last `bits` bits, in the middle of those that become the same.
+fn round(value: u8, bits: u32) -> u8 {
+    (value >> bits << bits) + (1_u8 << bits) / 2
 }
 
 impl Indexed {
@@ -163,14 +170,21 @@ mod tests {
     fn many_colours_come_close() {
         let picture = image((0..4096_u32).map(|i| [(i >> 4) as u8, (i >> 3) as u8, 7]));
         let indexed = Indexed::of(&picture);
-        assert_eq!(indexed.palette.len(), 256);
         for (pixel, index) in picture.rgba.as_chunks::<4>().0.iter().zip(&indexed.pixels) {
             let colour = indexed.palette[usize::from(*index)];
-            // 1024 distinct colours on a plane share 256: a step of 16 in each of two channels.
+            // 128 of them differ in their upper 6 bits; the middle of 4 values is at most 2 away.
             assert!(
-                (0..3).all(|i| pixel[i].abs_diff(colour[i]) <= 32),
+                (0..3).all(|i| pixel[i].abs_diff(colour[i]) <= 2),
                 "{pixel:?} {colour:?}"
             );
         }
+    }
+
+    #[test]
+    fn noise_has_256_colours() {
+        let noise = |i: u32, by: u32| (i.wrapping_mul(by) >> 7) as u8;
+        let picture =
+            image((0..65_536).map(|i| [noise(i, 7919), noise(i, 104_729), noise(i, 613)]));
+        assert_eq!(Indexed::of(&picture).palette.len(), 256);
     }
 }
