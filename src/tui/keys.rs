@@ -135,6 +135,37 @@ pub(super) fn named(key: KeyEvent) -> Option<String> {
     Some(format!("{prefix}{name}"))
 }
 
+/// Tells keys from what a slow terminal still answers, which arrives as keys: ESC ] or ESC _ up to ESC \
+/// or BEL.
+#[derive(Debug, Default)]
+pub(super) struct LateAnswer {
+    /// Keys of an answer so far.
+    taken: Option<usize>,
+}
+
+/// No answer is longer.
+const LONGEST_ANSWER: usize = 64;
+
+impl LateAnswer {
+    /// Whether this key belongs to an answer.
+    pub(super) fn takes(&mut self, key: KeyEvent) -> bool {
+        let escaped = key.modifiers.contains(KeyModifiers::ALT);
+        let bell = key.code == KeyCode::Char('g') && key.modifiers == KeyModifiers::CONTROL;
+        match (self.taken, key.code) {
+            (None, KeyCode::Char(']' | '_')) if escaped => self.taken = Some(1),
+            (None, _) => return false,
+            (Some(_), KeyCode::Char('\\')) if escaped => self.taken = None,
+            (Some(_), _) if bell => self.taken = None,
+            (Some(LONGEST_ANSWER..), _) => {
+                self.taken = None;
+                return false;
+            }
+            (Some(taken), _) => self.taken = Some(taken + 1),
+        }
+        true
+    }
+}
+
 /// Actions whose words contain all letters of `typed` in order, those that have them closest together
 /// first.
 pub(super) fn find(typed: &str) -> Vec<&'static Binding> {
@@ -207,6 +238,31 @@ mod tests {
             Some(Action::PreviousPanel)
         );
         assert_eq!(press(KeyCode::Char('z'), none), None);
+    }
+
+    #[test]
+    fn late_answers_are_no_keys_and_keys_after_them_are() {
+        let none = KeyModifiers::NONE;
+        let key = |letter, modifiers| KeyEvent::new(KeyCode::Char(letter), modifiers);
+        let ends = [
+            key('\\', KeyModifiers::ALT),
+            key('g', KeyModifiers::CONTROL),
+        ];
+        for (start, end) in [(']', ends[0]), (']', ends[1]), ('_', ends[0])] {
+            let mut late = LateAnswer::default();
+            assert!(!late.takes(key('x', none)));
+            assert!(late.takes(key(start, KeyModifiers::ALT)));
+            assert!(
+                "11;rgb:0000/0000/0000"
+                    .chars()
+                    .all(|letter| late.takes(key(letter, none)))
+            );
+            assert!(late.takes(end));
+            assert!(!late.takes(key('q', none)));
+        }
+        let mut late = LateAnswer::default();
+        assert!(late.takes(key(']', KeyModifiers::ALT)));
+        assert!(!(0..100).all(|_| late.takes(key('x', none))));
     }
 
     #[test]

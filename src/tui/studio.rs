@@ -14,6 +14,7 @@ use ratatui::layout::Rect;
 
 use super::event::{Answer, Command, Event};
 use super::graphics::{Aside, Painter, Protocol, cell_size, choose, painter};
+use super::keys::LateAnswer;
 use super::screen;
 use super::state::{Content, Same, Scene, Signals, Span, State};
 use super::terminal;
@@ -32,6 +33,8 @@ use crate::task::{Cancelled, Observer, Task};
 const FRAME: Duration = Duration::from_millis(33);
 /// How often a signal is looked for while no key is pressed: within the grace it gives.
 const WATCH: Duration = Duration::from_millis(25);
+/// Answers of a slow terminal come no later.
+const LATEST: Duration = Duration::from_secs(10);
 /// A loom's box is taken from so many of its frames.
 const BOUNDS_SAMPLES: usize = 32;
 
@@ -259,6 +262,7 @@ impl Studio {
     fn listen(&self, task: &Task) {
         let (events, task) = (self.events.clone(), task.clone());
         start("keyboard", move || {
+            let (begin, mut late) = (Instant::now(), LateAnswer::default());
             loop {
                 if task.cancelled() {
                     let _ = events.send(Event::Signal);
@@ -269,6 +273,12 @@ impl Studio {
                     Ok(true) => keyboard::read(),
                     Err(error) => Err(error),
                 };
+                if let Ok(keyboard::Event::Key(key)) = &event
+                    && begin.elapsed() < LATEST
+                    && late.takes(*key)
+                {
+                    continue;
+                }
                 let event = match event {
                     Ok(keyboard::Event::Key(key)) if key.kind != KeyEventKind::Release => {
                         Event::Key(key)
