@@ -4,6 +4,7 @@
 //! Times and frames count from 1, as people count them; so do control points.
 
 mod add_loop;
+mod bridge;
 mod exaggerate;
 mod extend;
 mod forward;

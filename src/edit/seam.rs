@@ -2,15 +2,15 @@
 
 use crate::loom::Loom;
 
-/// Ratios of the seam to the motion, in the shape subspace (rigid motion apart), at whole frames. About 1:
+/// Ratios of the seam to the motion, in the shape subspace (rigid motion apart), at whole frames. Below 1
 /// it cannot be told from the motion.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Seam {
-    /// Largest step at the seam over the largest elsewhere.
+    /// Largest step at the seam over the mean step elsewhere.
     pub step: f64,
     /// Largest change of velocity from frame to frame at the seam over the largest elsewhere.
     pub velocity: f64,
-    /// Largest second difference at the seam over the largest elsewhere.
+    /// Largest second difference at the seam over the median elsewhere.
     pub acceleration: f64,
 }
 
@@ -28,10 +28,23 @@ impl Seam {
         let norms = |all: &[Vec<f64>]| all.iter().map(|v| norm(v)).collect::<Vec<_>>();
         // A difference that starts at frame i (from 0) reaches over its order.
         let touches = |i: usize, order: usize| i < last && i + 1 + order >= first;
+        let (steps, jumps, bends) = (norms(&steps), norms(&jumps), norms(&bends));
+        let largest = |values: &[f64], order: usize| -> f64 {
+            (0..values.len())
+                .filter(|&i| touches(i, order))
+                .map(|i| values[i])
+                .fold(0.0, f64::max)
+        };
+        let elsewhere = |values: &[f64], order: usize| -> Vec<f64> {
+            (0..values.len())
+                .filter(|&i| !touches(i, order))
+                .map(|i| values[i])
+                .collect()
+        };
         Seam {
-            step: ratio(&norms(&steps), |i| touches(i, 1)),
-            velocity: ratio(&norms(&jumps), |i| touches(i, 1)),
-            acceleration: ratio(&norms(&bends), |i| touches(i, 2)),
+            step: ratio(largest(&steps, 1), mean(&elsewhere(&steps, 1))),
+            velocity: ratio(largest(&jumps, 1), most(&elsewhere(&jumps, 1))),
+            acceleration: ratio(largest(&bends, 2), median(elsewhere(&bends, 2))),
         }
     }
 
@@ -59,14 +72,20 @@ fn norm(v: &[f64]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// Largest of the values at the seam over the largest elsewhere.
-fn ratio(values: &[f64], seam: impl Fn(usize) -> bool) -> f64 {
-    let (mut inside, mut outside) = (0.0_f64, 0.0_f64);
-    for (i, value) in values.iter().enumerate() {
-        match seam(i) {
-            true => inside = inside.max(*value),
-            false => outside = outside.max(*value),
-        }
-    }
-    if inside == 0.0 { 0.0 } else { inside / outside }
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+fn most(values: &[f64]) -> f64 {
+    values.iter().copied().fold(0.0, f64::max)
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// 0 where the seam does not move, infinite where only the seam does.
+fn ratio(seam: f64, motion: f64) -> f64 {
+    if seam == 0.0 { 0.0 } else { seam / motion }
 }
