@@ -316,3 +316,71 @@ fn normals_are_computed_anew_where_there_were_some() {
         assert_eq!(again.positions(), given.positions());
     }
 }
+
+fn refused(world: &dyn World, spec: &InputSpec) -> String {
+    let opened = open(world, spec, &Task::default());
+    opened.map(|_| ()).unwrap_err().to_string()
+}
+
+#[test]
+fn a_folder_is_one_capture_or_refused_with_the_choices() {
+    let world = MemoryWorld::new();
+    let given = capture(4);
+    write(&world, &given, "a/frames.mdd");
+    let error = refused(&world, &InputSpec::new("a"));
+    assert!(error.contains("--mesh"), "{error}");
+    write(&world, &given.slice(0..1), "a/base.obj");
+    world.insert("a/notes.txt", *b"");
+    world.insert("a/.hidden.obj", *b"");
+    // a loom beside a capture is what was fitted to it
+    world.insert("a/fitted.loom", *b"");
+    let read_back = read(&world, &InputSpec::new("a"));
+    assert_eq!(read_back.positions(), given.positions());
+
+    write(&world, &given, "a/other.mdd");
+    let error = refused(&world, &InputSpec::new("a"));
+    assert!(error.contains("'a/frames.mdd' (1 file)"), "{error}");
+    assert!(error.contains("'a/other.mdd' (1 file)"), "{error}");
+
+    write(&world, &given, "b/walk_##.ply");
+    write(&world, &given, "b/run_##.ply");
+    let error = refused(&world, &InputSpec::new("b"));
+    assert!(error.contains("choose one: 'b/run_##.ply' (4 files), 'b/walk_##.ply' (4 files)"));
+    read(&world, &InputSpec::new("b/run_##.ply"));
+    assert!(
+        refused(&world, &InputSpec::new("b/rum_01.ply")).contains("did you mean b/run_01.ply?")
+    );
+}
+
+#[test]
+fn poses_with_names_are_taken_in_their_order() {
+    let world = MemoryWorld::new();
+    let given = capture(3);
+    for (frame, name) in ["anger", "cry", "fury"].into_iter().enumerate() {
+        write(
+            &world,
+            &given.slice(frame..frame + 1),
+            &format!("faces/{name}.obj"),
+        );
+    }
+    assert_eq!(
+        read(&world, &InputSpec::new("faces")).positions(),
+        given.positions()
+    );
+}
+
+#[test]
+fn a_sequence_outgrows_its_digits() {
+    let world = MemoryWorld::new();
+    let given = capture(101);
+    let names = write(&world, &given, "f#.ply");
+    assert_eq!((&*names[8], &*names[100]), ("f9.ply", "f101.ply"));
+    assert_eq!(
+        read(&world, &InputSpec::new("f#.ply")).positions(),
+        given.positions()
+    );
+    assert_eq!(
+        read(&world, &InputSpec::new("f*.ply")).positions(),
+        given.positions()
+    );
+}

@@ -5,8 +5,9 @@ use serde_json::json;
 use super::args::Input;
 use super::report;
 use super::session::{Outcome, Session};
-use crate::diag::{Diagnostic, Result};
-use crate::mesh::{Bounds, Edges};
+use crate::diag::Result;
+use crate::mesh::Bounds;
+use crate::pipeline::describe;
 
 /// Say what a capture holds
 #[derive(Debug, clap::Args)]
@@ -17,63 +18,29 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args, session: &Session) -> Result<Outcome> {
     let capture = session.open(&args.input.part.of(&args.input.inputs, None))?;
-    let frames = capture.content.frames();
-    let topology = frames.topology();
-    let edges = Edges::new(topology);
-    let bounds = Bounds::of_frames(&*frames)
-        .map_err(|error| Diagnostic::error(format!("a frame cannot be fetched: {error}")))?;
-    let closed = topology.faces() > 0 && edges.boundary() == 0;
-    let origin = &capture.origin;
+    let what = describe(&capture)?;
+    let closed = if what.closed { " (closed)" } else { "" };
+    let corner = |of: fn(&Bounds) -> [f32; 3]| {
+        let corner = what.bounds.as_ref().map(of);
+        corner.map_or("nothing".into(), point)
+    };
+    let rate = what.fps.map_or("not known".into(), report::number);
+    let size = report::bytes(what.bytes);
+    let files = report::count(capture.origin.files.len(), "file");
     let rows = [
-        ("frames", frames.frames().to_string()),
-        (
-            "frames a second",
-            frames.fps().map_or("not known".into(), report::number),
-        ),
-        ("vertices", topology.vertices().to_string()),
-        ("faces", topology.faces().to_string()),
-        ("edges", edges.ends().len().to_string()),
-        ("components", edges.components().to_string()),
-        (
-            "boundary edges",
-            format!(
-                "{}{}",
-                edges.boundary(),
-                if closed { " (closed)" } else { "" }
-            ),
-        ),
-        (
-            "from",
-            bounds.map_or("nothing".into(), |bounds| point(bounds.min)),
-        ),
-        (
-            "to",
-            bounds.map_or("nothing".into(), |bounds| point(bounds.max)),
-        ),
-        (
-            "format",
-            format!(
-                "{}, {} in {}",
-                origin.format,
-                report::bytes(origin.bytes),
-                report::count(origin.files.len(), "file")
-            ),
-        ),
+        ("frames", what.frames.to_string()),
+        ("frames a second", rate),
+        ("vertices", what.vertices.to_string()),
+        ("faces", what.faces.to_string()),
+        ("edges", what.edges.to_string()),
+        ("components", what.components.to_string()),
+        ("boundary edges", format!("{}{closed}", what.boundary_edges)),
+        ("from", corner(|bounds| bounds.min)),
+        ("to", corner(|bounds| bounds.max)),
+        ("format", format!("{}, {size} in {files}", what.format)),
     ];
     Ok(Outcome {
-        object: json!({
-            "frames": frames.frames(),
-            "vertices": topology.vertices(),
-            "faces": topology.faces(),
-            "edges": edges.ends().len(),
-            "components": edges.components(),
-            "boundary_edges": edges.boundary(),
-            "closed": closed,
-            "bounds": bounds.map(|bounds| json!({ "min": bounds.min, "max": bounds.max })),
-            "fps": frames.fps(),
-            "format": origin.format,
-            "bytes": origin.bytes,
-        }),
+        object: json!(what),
         report: report::table(session.style, &title(args), &rows),
         ..Outcome::default()
     })

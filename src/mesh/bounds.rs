@@ -5,7 +5,7 @@ use std::io;
 use super::FrameSource;
 
 /// An axis-aligned box, in the mesh's units.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Bounds {
     /// The smallest x, y, z.
     pub min: [f32; 3],

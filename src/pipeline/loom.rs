@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::input::{Files, InputSpec};
+use super::find::Files;
+use super::input::InputSpec;
 use super::open::{Capture, Content, Origin, in_file, no_mesh};
 use super::output::{Output, refuse_inputs};
 use super::save::Saved;

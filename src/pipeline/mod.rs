@@ -1,12 +1,15 @@
 //! The operations that the command line, recipes and the studio all call, over a World and a Task.
 
 mod deliver;
+mod describe;
+mod find;
 mod frames;
 mod input;
 mod key;
 mod lanes;
 mod loom;
 mod memory;
+mod numbering;
 mod open;
 mod output;
 mod picture;
@@ -18,7 +21,9 @@ mod value;
 mod workbench;
 
 pub use deliver::{deliver, plan_delivery};
-pub use input::{FrameRange, InputSpec, files};
+pub use describe::{Description, describe};
+pub use find::files;
+pub use input::{FrameRange, InputSpec};
 pub use key::{Key, KeyBuilder};
 pub use loom::{is_loom, open_loom, save_loom};
 pub use memory::{Made, Memory, Remembered};

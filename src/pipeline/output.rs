@@ -4,7 +4,7 @@
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-use super::input::{format_of, parent};
+use super::find::{format_of, parent};
 use crate::diag::{Diagnostic, Result};
 use crate::format::{Encoding, Format, Kind};
 use crate::world::World;
