@@ -86,6 +86,7 @@ type Root = std::option::Option<RootKind>;
 pub(super) fn run(args: &Args, session: &Session) -> Result<Outcome> {
     let capture = session.open(&args.input.part.of(&args.input.inputs, args.how.fps))?;
     let output = Output::from(&args.output).protecting(&capture.origin.files);
+    pipeline::check_loom_output(session.world(), &output)?;
     let sequence = capture.content.sequence(&session.task)?;
     let loom = fitted(session, &sequence, &args.how.options())?;
     pipeline::save_loom(session.world(), &loom, &output, &session.task)?;

@@ -1,6 +1,6 @@
 //! Looms to files and back.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use super::find::Files;
@@ -53,11 +53,11 @@ pub(super) fn open_as_frames(
     })
 }
 
-/// Writes a loom to a `.loom` file, staged and then moved to its place.
+/// Whether a loom may be written to `output`, to be asked before the work of fitting it.
 ///
 /// # Errors
-/// Another ending, an input would be written over, or the file cannot be written; cancellation.
-pub fn save_loom(world: &dyn World, loom: &Loom, output: &Output, task: &Task) -> Result<Saved> {
+/// Another ending than `.loom`, or an input would be written over.
+pub fn check_loom_output(world: &dyn World, output: &Output) -> Result<()> {
     let path = &output.path;
     if !is_loom(path) {
         return Diagnostic::error("a loom is written to a file that ends in .loom")
@@ -65,15 +65,23 @@ pub fn save_loom(world: &dyn World, loom: &Loom, output: &Output, task: &Task) -
             .hint(format!("such as {}", path.with_extension("loom").display()))
             .err();
     }
-    refuse_inputs(world, [path], &output.inputs)?;
+    refuse_inputs(world, [path], &output.inputs)
+}
+
+/// Writes a loom to a `.loom` file, staged and then moved to its place.
+///
+/// # Errors
+/// As [`check_loom_output`], or the file cannot be written; cancellation.
+pub fn save_loom(world: &dyn World, loom: &Loom, output: &Output, task: &Task) -> Result<Saved> {
+    check_loom_output(world, output)?;
     task.phase("write", 1);
-    let stage = world.stage(path)?;
+    let stage = world.stage(&output.path)?;
     let name = "loom".to_string();
     stage.write(&name, &format::loom::write(loom)?)?;
     task.check()?;
-    stage.commit(&[(name, path.clone())], &[])?;
+    stage.commit(&[(name, output.path.clone())], &[])?;
     Ok(Saved {
-        outputs: vec![PathBuf::from(path)],
+        outputs: vec![output.path.clone()],
         removed: Vec::new(),
         frames: loom.frames(),
     })

@@ -25,7 +25,7 @@ pub use describe::{Description, describe};
 pub use find::files;
 pub use input::{FrameRange, InputSpec};
 pub use key::{Key, KeyBuilder};
-pub use loom::{is_loom, open_loom, save_loom};
+pub use loom::{check_loom_output, is_loom, open_loom, save_loom};
 pub use memory::{Made, Memory, Remembered};
 pub use open::{Capture, Content, Origin, open};
 pub use output::{Output, Plan, plan};
