@@ -99,10 +99,8 @@ fn draw(figure: &mut Figure) -> Result<()> {
 /// What sharing sites costs with full numbers at most, relative.
 fn merged(sequence: &Sequence) -> Result<f64> {
     let n = sequence.frames();
-    Ok(support::fit(sequence, [n + 2, n, n - 1])?
-        .report()
-        .merged
-        .error)
+    let loom = support::fit(sequence, [n + 2, n, n - 1])?;
+    Ok(loom.report().merged.error * (n as f64).sqrt()) // all frames like the worst
 }
 
 fn errors(sequence: &Sequence) -> Result<Errors> {
