@@ -182,7 +182,7 @@ fn median(values: &[f32], dimension: usize, [k, l, m, _]: [usize; 4]) -> Result<
         sites: Some(l),
         modes: Some(m),
         left_out: false,
-        ..FitOptions::default()
+        ..FitOptions::ch12()
     };
     let mut runs = Vec::new();
     for _ in 0..RUNS {

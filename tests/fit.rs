@@ -51,7 +51,7 @@ fn given(controls: usize, sites: usize, modes: usize) -> FitOptions {
         controls: Some(controls),
         sites: Some(sites),
         modes: Some(modes),
-        ..FitOptions::default()
+        ..FitOptions::ch12()
     }
 }
 
@@ -191,7 +191,7 @@ fn a_tolerance_is_kept_or_its_breach_is_said() {
     for tolerance in [0.2, 0.05, 0.01, 1e-3, 1e-5] {
         let options = FitOptions {
             tolerance,
-            ..FitOptions::default()
+            ..FitOptions::ch12()
         };
         let fitted = fit(&sequence, &options);
         assert!(fitted.errors.total <= tolerance, "{:?}", fitted.errors);
@@ -200,7 +200,7 @@ fn a_tolerance_is_kept_or_its_breach_is_said() {
     let options = FitOptions {
         tolerance: 1e-4,
         sites: Some(3),
-        ..FitOptions::default()
+        ..FitOptions::ch12()
     };
     let fitted = fit(&sequence, &options);
     assert!(fitted.errors.total > 1e-4);
@@ -219,7 +219,7 @@ fn a_looser_tolerance_stores_no_more() {
             &sequence,
             &FitOptions {
                 tolerance,
-                ..FitOptions::default()
+                ..FitOptions::ch12()
             },
         );
         let signals = &fitted.signals;
@@ -235,7 +235,7 @@ fn what_is_given_is_kept_and_the_rest_follows() {
     let options = FitOptions {
         sites: Some(36),
         tolerance: 0.05,
-        ..FitOptions::default()
+        ..FitOptions::ch12()
     };
     let fitted = fit(&sequence, &options);
     assert_eq!(fitted.signals.pose.sites().len(), 36);
@@ -243,7 +243,7 @@ fn what_is_given_is_kept_and_the_rest_follows() {
     let options = FitOptions {
         controls: Some(30),
         tolerance: 0.05,
-        ..FitOptions::default()
+        ..FitOptions::ch12()
     };
     let fitted = fit(&sequence, &options);
     assert_eq!(fitted.signals.time.controls().len(), 30);
@@ -264,12 +264,12 @@ fn numbers_out_of_bounds_are_refused_and_the_bound_is_named() {
     }
     let alpha = FitOptions {
         alpha: 1.5,
-        ..FitOptions::default()
+        ..FitOptions::ch12()
     };
     assert!(refusal(&sequence, &alpha).contains("alpha is 1.5"));
     let tolerance = FitOptions {
         tolerance: f64::NAN,
-        ..FitOptions::default()
+        ..FitOptions::ch12()
     };
     assert!(refusal(&sequence, &tolerance).contains("tolerance"));
 }
@@ -325,7 +325,7 @@ fn pins_that_name_no_frame_or_one_twice_are_refused() {
                 at: PinPlace::Layout([0.0, 0.0]),
             })
             .collect(),
-        ..FitOptions::default()
+        ..FitOptions::ch12()
     };
     assert!(refusal(&sequence, &pins(&[11])).contains("no frame 11 to pin"));
     assert!(refusal(&sequence, &pins(&[0])).contains("no frame 0 to pin"));
@@ -338,7 +338,7 @@ fn straight_motion_needs_one_mode_and_is_right_between_frames() {
         &straight(21),
         &FitOptions {
             tolerance: 1e-4,
-            ..FitOptions::default()
+            ..FitOptions::ch12()
         },
     );
     assert_eq!(fitted.shape.modes(), 1);
@@ -354,7 +354,7 @@ fn straight_motion_needs_one_mode_and_is_right_between_frames() {
 fn few_or_motionless_frames_are_constant_or_a_segment() {
     for n in [1, 2, 6] {
         let still = capture(n, 10, |v, _| [v, v * 0.1, 0.3]);
-        let fitted = fit(&still, &FitOptions::default());
+        let fitted = fit(&still, &FitOptions::ch12());
         assert_eq!(fitted.shape.modes(), 0);
         assert_eq!(fitted.errors.total, 0.0);
         for (z, expected) in psi(&fitted, 1.0).iter().zip(still.frame(0)) {
@@ -368,7 +368,7 @@ fn few_or_motionless_frames_are_constant_or_a_segment() {
         );
     }
     let two = straight(2);
-    let fitted = fit(&two, &FitOptions::default());
+    let fitted = fit(&two, &FitOptions::ch12());
     assert!(measured(&two, &fitted) < 1e-12);
     let (a, b, middle) = (psi(&fitted, 1.0), psi(&fitted, 2.0), psi(&fitted, 1.5));
     for ((a, b), middle) in a.iter().zip(&b).zip(&middle) {
@@ -399,7 +399,7 @@ fn a_pose_that_is_held_and_a_cycle_run_twice_are_fitted() {
             &sequence,
             &FitOptions {
                 tolerance: 1e-3,
-                ..FitOptions::default()
+                ..FitOptions::ch12()
             },
         );
         assert!(measured(&sequence, &fitted) <= 1e-3, "{:?}", fitted.errors);

@@ -103,7 +103,7 @@ impl Figure {
 
 /// Fits `sequence` with given k, l, m.
 pub(crate) fn fit(sequence: &Sequence, [controls, sites, modes]: [usize; 3]) -> Result<Loom> {
-    fit_with(sequence, [controls, sites, modes], FitOptions::default())
+    fit_with(sequence, [controls, sites, modes], FitOptions::ch12())
 }
 
 /// Fits with given k, l, m and other options.

@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::report::Ordered;
 use super::subspace::Subspace;
 use crate::diag::{Diagnostic, Result};
 use crate::math::b_spline::Point;
@@ -25,6 +26,8 @@ pub struct Signals {
     pub distinct: usize,
     /// Largest distance of a frame from the mean of those merged with it, in the shape subspace.
     pub merged: f64,
+    /// What the ordered method says of its fit.
+    pub ordered: Option<Ordered>,
 }
 
 /// Lays the frames out, from their leading coordinates, with the `pins` (frames from 0) held.
@@ -130,6 +133,7 @@ pub fn signals(
         layout,
         distinct: pose.distinct,
         merged: pose.spread,
+        ordered: None,
         pose: pose.signal,
         time,
     })

@@ -174,6 +174,7 @@ impl Candidate {
                 layout: self.layout,
                 distinct: self.pose.distinct,
                 merged: self.pose.spread,
+                ordered: None,
                 pose: self.pose.signal,
                 time,
             },

@@ -22,18 +22,21 @@ const SAMPLES: usize = 16;
 /// How psi is found between frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Method {
-    /// As CH12 prints it: frames laid out by their distances alone.
+    /// Frames laid out in their order, signals fitted to what lies between them too.
     #[default]
+    Ordered,
+    /// As CH12 prints it: frames laid out by their distances alone.
     Ch12,
 }
 
 impl Method {
     /// All there are.
-    pub const ALL: &[Method] = &[Method::Ch12];
+    pub const ALL: &[Method] = &[Method::Ordered, Method::Ch12];
 
     /// Its name on the command line.
     pub fn name(self) -> &'static str {
         match self {
+            Method::Ordered => "ordered",
             Method::Ch12 => "ch12",
         }
     }
@@ -58,6 +61,9 @@ pub struct FitOptions {
     pub pins: Vec<Pin>,
     /// Exponent of the time signal's parametrisation, 0 (uniform) to 1 (by length); default 1/2.
     pub alpha: f64,
+    /// (tau, theta) of an earlier ordered fit of nearly these frames: its layout is kept unless the motion
+    /// has a spike with it now, so that the map stays the one that is known.
+    pub near: Option<(f64, f64)>,
     /// Root motion to split off and keep as a signal of its own; none: it stays in the shapes.
     pub root: Option<RootKind>,
     /// Frames per second, where the capture does not say or says wrong.
@@ -77,6 +83,7 @@ impl Default for FitOptions {
             tolerance: 0.01,
             pins: Vec::new(),
             alpha: 0.5,
+            near: None,
             root: None,
             fps: None,
             left_out: true,
@@ -85,6 +92,14 @@ impl Default for FitOptions {
 }
 
 impl FitOptions {
+    /// The paper's method, all else as by default.
+    pub fn ch12() -> Self {
+        FitOptions {
+            method: Method::Ch12,
+            ..FitOptions::default()
+        }
+    }
+
     pub(super) fn fidelity(&self) -> Fidelity {
         Fidelity {
             controls: self.controls,
@@ -228,6 +243,7 @@ fn report(
             .iter()
             .map(|warning| warning.message.clone())
             .collect(),
+        spans: fitted.spans.clone(),
         method: options.method.name().to_string(),
         alpha: options.alpha,
         rank: fitted.rank,

@@ -5,7 +5,9 @@ use super::ch12::{self, Signals};
 use super::fidelity::{self, Chosen};
 use super::fit::{FitOptions, Method};
 use super::left_out::{self, LeftOutFit};
-use super::report::Errors;
+use super::ordered::{self, Laid, advice};
+use super::pins::{self, Pin};
+use super::report::{Change, Errors, Span};
 use super::subspace::{Subspace, explained};
 use super::warnings;
 use crate::diag::{Diagnostic, Result};
@@ -26,6 +28,8 @@ pub struct Fitted {
     pub errors: Errors,
     /// Errors between them.
     pub left_out: Option<LeftOutFit>,
+    /// Where the motion between them goes astray, and what would mend it.
+    pub spans: Vec<Span>,
     /// Modes that are not rounding.
     pub rank: usize,
     /// What should be known.
@@ -40,7 +44,16 @@ pub fn fit_rows(rows: &dyn Rows, options: &FitOptions, task: &Task) -> Result<Fi
     options.check(rows.rows())?;
     task.phase("shape", 0);
     let pca = Pca::new(rows, task).map_err(explained)?;
-    let (basis, chosen) = choose(rows, &pca, options, task)?;
+    let (basis, chosen) = match options.method {
+        Method::Ch12 => choose(rows, &pca, options, task)?,
+        Method::Ordered => ordered::tolerance::choose(
+            rows,
+            &pca,
+            &options.fidelity(),
+            (&options.pins, options.near),
+            task,
+        )?,
+    };
     let Chosen {
         subspace,
         signals,
@@ -53,7 +66,10 @@ pub fn fit_rows(rows: &dyn Rows, options: &FitOptions, task: &Task) -> Result<Fi
         None
     };
     let fidelity = options.fidelity();
+    let spans = spans(&subspace, &signals, options, task)?;
     let mut warnings = warnings::of_fidelity(&fidelity, &basis, &signals, &errors, met);
+    warnings.extend(warnings::of_ordered(&subspace, &signals));
+    warnings.extend(warnings::of_spans(&spans));
     warnings.extend(left_out.as_ref().and_then(warnings::between_frames));
     let mut vectors = basis.vectors;
     vectors.truncate(subspace.modes * rows.columns());
@@ -66,6 +82,7 @@ pub fn fit_rows(rows: &dyn Rows, options: &FitOptions, task: &Task) -> Result<Fi
         signals,
         errors,
         left_out,
+        spans,
         rank: basis.rank,
         warnings,
     })
@@ -97,6 +114,48 @@ fn choose(
     Ok((basis, chosen))
 }
 
+/// (tau, theta) of an ordered fit.
+fn choice_of(signals: &Signals) -> Option<(f64, f64)> {
+    signals.ordered.map(|ordered| (ordered.tau, ordered.theta))
+}
+
+/// Where the motion between frames goes astray, and what would mend it.
+fn spans(
+    subspace: &Subspace,
+    signals: &Signals,
+    options: &FitOptions,
+    task: &Task,
+) -> Result<Vec<Span>> {
+    let mut spans = advice::spans(subspace, signals);
+    if spans.is_empty() {
+        return Ok(spans);
+    }
+    let laid = match options.method {
+        Method::Ch12 => None,
+        Method::Ordered => Some(Laid::out(subspace, choice_of(signals), task)?),
+    };
+    let fit = |change: Change| -> Result<Signals> {
+        let (mut pins, mut sites) = (options.pins.clone(), signals.pose.sites().len());
+        match change {
+            Change::Pin { frame, at } => {
+                pins.retain(|pin| pin.frame != frame);
+                pins.push(Pin::at(frame - 1, at));
+            }
+            Change::Sites(more) => sites = more,
+        }
+        let controls = signals.time.controls().len();
+        match &laid {
+            Some(laid) => laid.signals(controls, sites, &pins, task),
+            None => {
+                let pins = pins::placed(&pins, subspace, task)?;
+                ch12::signals(subspace, (controls, sites), (options.alpha, &pins), task)
+            }
+        }
+    };
+    advice::advise(subspace, signals, &mut spans, &fit)?;
+    Ok(spans)
+}
+
 /// The error between frames. Pins of frames that are kept hold there too.
 fn left_out(
     pca: &Pca,
@@ -113,6 +172,10 @@ fn left_out(
         .collect();
     let method = |subspace: &Subspace, controls: usize, sites: usize| match options.method {
         Method::Ch12 => ch12::signals(subspace, (controls, sites), (options.alpha, &pins), task),
+        Method::Ordered => {
+            let pins: Vec<Pin> = pins.iter().map(|&(frame, at)| Pin::at(frame, at)).collect();
+            Laid::out(subspace, None, task)?.signals(controls, sites, &pins, task)
+        }
     };
     left_out::measure(pca, (controls, sites, signals.pose.modes()), &method, task)
 }

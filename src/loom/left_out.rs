@@ -57,6 +57,50 @@ pub fn measure(
     }))
 }
 
+/// The fewest modes, from `least` on, for which a cubic spline in the shape subspace of the kept frames
+/// is at most `cost` times as wrong at the left-out frames as one in every coordinate; `least` where there
+/// are too few frames to tell.
+///
+/// # Errors
+/// The task was cancelled.
+pub fn modes_between(pca: &Pca, least: usize, cost: f64, task: &Task) -> Result<usize> {
+    if pca.rows() < 5 {
+        return Ok(least);
+    }
+    let halves = Halves::of(&pca.reduced(), pca.rows());
+    let table = Table::new(&halves.kept, halves.width);
+    let most = halves.kept.len() / halves.width - 1;
+    let (kept, basis) = decomposed(&table, most, task)?;
+    let cubic = halves.cubic();
+    let whole: f64 = halves.errors(&cubic).iter().sum();
+    // What mode j takes away from the squared error: e.e - (e + c).(e + c) with e the cubic's error and
+    // c its coordinate there.
+    let mut dropped = vec![0.0; basis.modes];
+    for (row, out) in cubic
+        .chunks_exact(halves.width)
+        .zip(halves.out.chunks_exact(halves.width))
+    {
+        for (vector, dropped) in basis.vectors.chunks_exact(halves.width).zip(&mut dropped) {
+            let (mut error, mut coordinate) = (0.0, 0.0);
+            for (i, h) in vector.iter().enumerate() {
+                error += h * (out[i] - row[i]);
+                coordinate += h * (row[i] - kept.mean()[i]);
+            }
+            *dropped += coordinate * (2.0 * error + coordinate);
+        }
+    }
+    let mut error = whole;
+    let mut modes = basis.modes;
+    while modes > least {
+        error += dropped[modes - 1];
+        if error > cost * cost * whole {
+            break;
+        }
+        modes -= 1;
+    }
+    Ok(modes.max(least))
+}
+
 /// Frames 1, 3, 5, .. and, each between two of them, 2, 4, ..; rows of `width` numbers.
 struct Halves {
     width: usize,

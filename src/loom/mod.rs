@@ -7,6 +7,7 @@ pub mod fit;
 pub mod fitted;
 pub mod frames;
 pub mod left_out;
+pub mod ordered;
 pub mod pins;
 pub mod report;
 pub mod session;

@@ -15,6 +15,16 @@ pub struct Pin {
     pub at: PinPlace,
 }
 
+impl Pin {
+    /// A frame (from 0) at a place in the layout's own units.
+    pub fn at(frame: usize, place: Point) -> Self {
+        Pin {
+            frame: frame + 1,
+            at: PinPlace::Layout(place),
+        }
+    }
+}
+
 /// Where a pin holds its frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum PinPlace {
@@ -55,11 +65,17 @@ pub fn check(pins: &[Pin], frames: usize) -> Result<()> {
 /// The task was cancelled.
 pub fn placed(pins: &[Pin], subspace: &Subspace, task: &Task) -> Result<Vec<(usize, Point)>> {
     let relative = pins.iter().any(|pin| matches!(pin.at, PinPlace::Box(_)));
-    let (low, size) = if relative {
-        bounds(&ch12::place(subspace, &[], task)?.positions)
+    let unpinned = if relative {
+        ch12::place(subspace, &[], task)?.positions
     } else {
-        ([0.0; 2], [0.0; 2])
+        Vec::new()
     };
+    Ok(within(pins, &unpinned))
+}
+
+/// Pins as frames from 0 and points of a layout that lies at `unpinned` without them.
+pub fn within(pins: &[Pin], unpinned: &[Point]) -> Vec<(usize, Point)> {
+    let (low, size) = bounds(unpinned);
     let place = |pin: &Pin| match pin.at {
         PinPlace::Layout(point) => (pin.frame - 1, point),
         PinPlace::Box(part) => (
@@ -67,7 +83,7 @@ pub fn placed(pins: &[Pin], subspace: &Subspace, task: &Task) -> Result<Vec<(usi
             [0, 1].map(|axis| low[axis] + part[axis] * size[axis]),
         ),
     };
-    Ok(pins.iter().map(place).collect())
+    pins.iter().map(place).collect()
 }
 
 /// Lower left corner and size of the box around points.

@@ -52,6 +52,10 @@ pub struct FitReport {
     pub layout: LayoutReport,
     /// Positions so close that they are one site, and what that costs.
     pub merged: Merged,
+    /// How the ordered method found it.
+    pub ordered: Option<Ordered>,
+    /// Where the motion between frames still goes astray, and what would mend it; the worst first.
+    pub spans: Vec<Span>,
 }
 
 /// Relative errors at the frames: sqrt(sum ||.||^2) / sqrt(sum ||z_i - mean||^2).
@@ -114,6 +118,72 @@ pub struct Merged {
     pub error: f64,
 }
 
+/// The ordered method's choice of a layout, and how right it is between frames.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Ordered {
+    /// How near returning poses must be to be joined, in root mean square distances.
+    pub tau: f64,
+    /// From 1 (distances along the motion) to 0 (plain distances).
+    pub theta: f64,
+    /// Root mean square radius of the unpinned layout, in units of the shape space.
+    pub radius: f64,
+    /// Root mean square deviation from the cubic spline through the frames at the samples fitted,
+    /// relative to the motion's spread in the shape subspace.
+    pub at_samples: f64,
+    /// The same between those samples.
+    pub between: f64,
+    /// The largest of those, in root mean square steps between frames.
+    pub worst: f64,
+    /// Residuals evaluated.
+    pub evaluations: usize,
+    /// Whether the refinement had settled before they were used up.
+    pub converged: bool,
+}
+
+/// Consecutive frames between which g o f leaves the way of the frames.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Span {
+    /// First frame, from 1.
+    pub first: usize,
+    /// Last frame.
+    pub last: usize,
+    /// Largest distance from the cubic spline through the frames, in root mean square steps.
+    pub deviation: f64,
+    /// Largest distance from the segment between two frames, in lengths of that segment.
+    pub off_segment: f64,
+    /// Least Gaussian curvature of g along f, times the squared root mean square step; a saddle where it
+    /// is well below 0.
+    pub curvature: f64,
+    /// What would mend it, the best first.
+    pub mends: Vec<Mend>,
+}
+
+/// A change of the options that would mend a span.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Mend {
+    /// What to change.
+    pub change: Change,
+    /// The span's deviation after the change over that before.
+    pub left: f64,
+}
+
+/// What to change.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Change {
+    /// Pin this frame (from 1) at this place of the map.
+    Pin {
+        /// The frame.
+        frame: usize,
+        /// The place.
+        at: Point,
+    },
+    /// Ask for so many sites.
+    Sites(usize),
+}
+
 impl FitReport {
     /// What signals say about themselves, with so many frames pinned; whatever needs more is left open.
     pub fn of_signals(subspace: &Subspace, signals: &Signals, pinned: usize) -> Self {
@@ -145,6 +215,7 @@ impl FitReport {
                 frames: n - signals.distinct.min(n),
                 error: subspace.relative(signals.merged),
             },
+            ordered: signals.ordered,
             ..FitReport::default()
         }
     }

@@ -3,6 +3,9 @@
 use std::sync::Arc;
 
 use super::ch12::{self, Signals};
+use super::fit::Method;
+use super::ordered::Laid;
+use super::ordered::drag::Drag;
 use super::pins::{self, Pin, PinPlace};
 use super::report::FitReport;
 use super::subspace::Subspace;
@@ -25,6 +28,8 @@ pub struct Session {
     layout: Layout,
     pose: PoseSignal,
     controls: usize,
+    /// What follows the pins of an ordered fit.
+    ordered: Option<Drag>,
     /// Distinct positions, and the error that merging the others makes, when sites were last chosen.
     merged: (usize, f64),
 }
@@ -40,27 +45,32 @@ impl Session {
     ) -> Self {
         Session {
             distances: subspace.distances(),
-            subspace,
             alpha,
             pins,
             layout: signals.layout.clone(),
             pose: signals.pose.clone(),
             controls: signals.time.controls().len(),
             merged: (signals.distinct, signals.merged),
+            ordered: Drag::new(&subspace, &signals.time, &signals.pose, signals.ordered),
+            subspace,
         }
     }
 
-    /// Of a loom as it was fitted, by CH12's method.
+    /// Of a loom as it was fitted.
     ///
     /// # Errors
-    /// The loom's time was edited since, or its signals were not fitted by distances alone: a new
-    /// layout would undo that.
+    /// The loom's time was edited since, or its signals were not fitted to frames: a new layout would
+    /// undo that.
     pub fn of(loom: &Loom) -> Result<Self> {
         let (fitted, report, time) = (loom.layout(), loom.report(), loom.time());
         let frames = fitted.positions.len();
-        if frames == 0 || report.method != "ch12" {
-            return Diagnostic::error("this loom has no layout by distances to pin")
-                .hint("pins belong to looms fitted with method ch12")
+        if frames == 0
+            || !Method::ALL
+                .iter()
+                .any(|method| method.name() == report.method)
+        {
+            return Diagnostic::error("this loom has no layout of frames to pin")
+                .hint("pins belong to looms that were fitted to frames")
                 .err();
         }
         if time.places().len() != frames || !time.warps().is_empty() {
@@ -95,6 +105,7 @@ impl Session {
             pose: loom.pose().as_ref().clone(),
             controls: time.controls().len(),
             merged: (frames - report.merged.frames, report.merged.error * spread),
+            ordered: Drag::new(&subspace, time, loom.pose(), report.ordered),
             subspace,
         })
     }
@@ -148,6 +159,12 @@ impl Session {
     /// There is no such frame, or `to` is not finite; the task was cancelled.
     pub fn drag(&mut self, frame: usize, to: Point, task: &Task) -> Result<Signals> {
         self.hold(frame, to)?;
+        if let Some(ordered) = &mut self.ordered {
+            let signals = ordered.to(&self.subspace, &self.pins, task)?;
+            self.layout = signals.layout.clone();
+            self.pose = signals.pose.clone();
+            return Ok(signals);
+        }
         let start = &self.layout.positions;
         let layout = ch12::place_from(&self.distances, start, &self.pins, task)?;
         let rows = ch12::rows(&self.subspace, &layout.positions);
@@ -187,6 +204,9 @@ impl Session {
     /// # Errors
     /// The task was cancelled.
     pub fn settle(&mut self, task: &Task) -> Result<Signals> {
+        if self.ordered.is_some() {
+            return self.settle_ordered(task);
+        }
         let start = self.subspace.leading();
         self.layout = ch12::place_from(&self.distances, &start, &self.pins, task)?;
         let sites = self.pose.sites().len();
@@ -194,6 +214,22 @@ impl Session {
         self.pose = fit.signal;
         self.merged = (fit.distinct, fit.spread);
         self.signals()
+    }
+
+    fn settle_ordered(&mut self, task: &Task) -> Result<Signals> {
+        let pins: Vec<Pin> = self
+            .pins
+            .iter()
+            .map(|&(frame, to)| Pin::at(frame, to))
+            .collect();
+        let sites = self.pose.sites().len();
+        let laid = Laid::out(&self.subspace, None, task)?;
+        let signals = laid.signals(self.controls, sites, &pins, task)?;
+        self.layout = signals.layout.clone();
+        self.pose = signals.pose.clone();
+        let (time, pose) = (&signals.time, &signals.pose);
+        self.ordered = Drag::new(&self.subspace, time, pose, signals.ordered);
+        Ok(signals)
     }
 
     fn signals(&self) -> Result<Signals> {
@@ -204,6 +240,7 @@ impl Session {
             time: ch12::time_within(&self.layout.positions, self.controls, self.alpha)?,
             distinct,
             merged,
+            ordered: None,
         })
     }
 }

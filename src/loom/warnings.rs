@@ -3,7 +3,9 @@
 use super::ch12::Signals;
 use super::fidelity::Fidelity;
 use super::left_out::LeftOutFit;
-use super::report::Errors;
+use super::ordered::SITES_PER_MODE;
+use super::report::{Change, Errors, Span};
+use super::subspace::Subspace;
 use crate::diag::Diagnostic;
 use crate::math::pca::Basis;
 
@@ -56,6 +58,45 @@ pub fn of_fidelity(
         )));
     }
     warnings
+}
+
+/// Fewer sites than the rule l >= 2m asks for.
+pub fn of_ordered(subspace: &Subspace, signals: &Signals) -> Option<Diagnostic> {
+    let (sites, modes) = (signals.pose.sites().len(), subspace.modes);
+    let wanted = (SITES_PER_MODE * modes).min(subspace.frames);
+    (signals.ordered.is_some() && sites < wanted).then(|| {
+        Diagnostic::warning(format!(
+            "l = {sites} sites are few for m = {modes} modes: no layout carries that many"
+        ))
+        .hint(format!("l = {wanted} or more, or fewer modes"))
+    })
+}
+
+/// Where the motion between frames goes astray, and what would mend the worst of it.
+pub fn of_spans(spans: &[Span]) -> Option<Diagnostic> {
+    let worst = spans.first()?;
+    let mut named: Vec<String> = spans
+        .iter()
+        .take(SPANS)
+        .map(|span| format!("{}-{}", span.first, span.last))
+        .collect();
+    if spans.len() > SPANS {
+        named.push(format!("{} more", spans.len() - SPANS));
+    }
+    let warning = Diagnostic::warning(format!(
+        "the motion leaves the way of its frames by up to {:.2} of a frame step, in frames {}",
+        worst.deviation,
+        named.join(", ")
+    ));
+    let mends = worst.mends.iter().map(|mend| {
+        let change = match mend.change {
+            Change::Sites(sites) => format!("--sites {sites}"),
+            Change::Pin { frame, at } => format!("--pin {frame}={:.4},{:.4}", at[0], at[1]),
+        };
+        let (first, last, left) = (worst.first, worst.last, 100.0 * mend.left);
+        format!("`{change}` would leave {left:.0} % of it in frames {first}-{last}")
+    });
+    Some(mends.fold(warning, Diagnostic::hint))
 }
 
 /// Where psi does worse than linear blending between frames, if it does on the whole.

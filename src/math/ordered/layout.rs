@@ -59,6 +59,7 @@ pub(super) struct Candidate {
 }
 
 /// The distances that layouts are made from.
+#[derive(Debug, Clone)]
 pub(super) struct Order {
     plain: Distances,
     /// Their root mean square.
@@ -95,51 +96,52 @@ impl Order {
         self.plain.values().iter().filter(|&&d| d < reach).count()
     }
 
-    /// A candidate with its samples `pins` where they belong: none as it is, one translated, more held
-    /// while the others follow. Without a score of its own.
+    /// A candidate with its samples `pins` where they belong. Without a score of its own.
     pub(super) fn pinned(
         &self,
         candidate: &Candidate,
         pins: &[(usize, Point)],
-        stop: &Stop,
         task: &Task,
     ) -> Result<Candidate, Cancelled> {
-        let points = points(candidate.layout.as_ref());
-        let moved = match pins {
-            [] => points,
-            [one] => translated(&points, *one),
-            _ => {
-                let targets = self.targets(candidate.choice);
-                let scale = 1.0 / candidate.natural;
-                let mut values = targets.values().iter();
-                let targets = Distances::from_fn(targets.count(), |_, _| {
-                    scale * values.next().unwrap_or(&0.0)
-                });
-                least_stress(&targets, &turned_to(pins, &points), pins, stop, task)?
-            }
-        };
+        if pins.is_empty() {
+            return Ok(candidate.clone());
+        }
+        let targets = self.targets(candidate.choice);
+        let mut values = targets.values().iter();
+        let targets = Distances::from_fn(targets.count(), |_, _| {
+            values.next().unwrap_or(&0.0) / candidate.natural
+        });
+        let start = candidate.layout.as_ref();
         Ok(Candidate {
-            layout: Mat::from_fn(moved.len(), 2, |i, a| moved[i][a]),
+            layout: held(&targets, start, pins, &Stop::default(), task)?,
             ..candidate.clone()
         })
     }
 }
 
 impl Candidate {
-    /// A layout made elsewhere, of radius 1 when it was unpinned, then `natural` large.
-    pub(super) fn known(choice: Choice, layout: Mat<f64>, natural: f64) -> Self {
-        Candidate {
-            choice,
-            layout,
-            natural,
-            score: f64::INFINITY,
-        }
-    }
-
     /// Its radius in units of the motion.
     pub(super) fn natural(&self) -> f64 {
         self.natural
     }
+}
+
+/// Points (n x 2) that keep their `distances` as far as `pins` allow, from where they are: none as they
+/// are, one translated, more held while the others follow.
+pub(super) fn held(
+    distances: &Distances,
+    start: MatRef<'_, f64>,
+    pins: &[(usize, Point)],
+    stop: &Stop,
+    task: &Task,
+) -> Result<Mat<f64>, Cancelled> {
+    let start = points(start);
+    let moved = match pins {
+        [] => start,
+        [one] => translated(&start, *one),
+        _ => least_stress(distances, &turned_to(pins, &start), pins, stop, task)?,
+    };
+    Ok(Mat::from_fn(moved.len(), 2, |i, a| moved[i][a]))
 }
 
 /// Lays the motion out unrolled for each reach, walks from the largest accepted one, and returns what
@@ -151,11 +153,7 @@ pub(super) fn candidates(
     floor: f64,
     task: &Task,
 ) -> Result<Vec<Candidate>, Cancelled> {
-    let scale = Scale {
-        samples,
-        curve: samples.curve(samples.usual_controls()),
-        sites: samples.usual_sites(),
-    };
+    let scale = Scale::new(samples);
     let mut unrolled = unrolled(order, &scale, task)?;
     let tolerated = FLOORS * floor * samples.spread;
     let least = unrolled
@@ -177,6 +175,26 @@ pub(super) fn candidates(
     worth.extend(unrolled);
     worth.truncate(CANDIDATES);
     Ok(worth)
+}
+
+/// The layout of a choice, reached as the search would: unrolled first, then walked.
+pub(super) fn known(
+    order: &Order,
+    samples: &Samples,
+    choice: Choice,
+    task: &Task,
+) -> Result<Candidate, Cancelled> {
+    let scale = Scale::new(samples);
+    let tau = choice.tau;
+    let graph = order.graph(tau);
+    let unrolled = Choice { tau, theta: 1.0 };
+    let mut candidate = scale.candidate(unrolled, &graph, &classical(&graph), task)?;
+    for theta in WALK.into_iter().filter(|&theta| theta >= choice.theta) {
+        let targets = blend(&order.plain, &graph, theta, 1e-9 * order.radius);
+        let start = points(candidate.layout.as_ref());
+        candidate = scale.candidate(Choice { tau, theta }, &targets, &start, task)?;
+    }
+    Ok(candidate)
 }
 
 /// theta = 1 for every reach that joins other pairs than the one before.
@@ -230,7 +248,15 @@ struct Scale<'a> {
     sites: usize,
 }
 
-impl Scale<'_> {
+impl<'a> Scale<'a> {
+    fn new(samples: &'a Samples) -> Self {
+        Scale {
+            samples,
+            curve: samples.curve(samples.usual_controls()),
+            sites: samples.usual_sites(),
+        }
+    }
+
     /// The layout of least stress near `start`, scored.
     fn candidate(
         &self,

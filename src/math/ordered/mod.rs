@@ -9,12 +9,14 @@
 //! - [`layout`]: the frames are laid out by distances along the motion (geodesics of the order graph),
 //!   then walked towards plain distances as long as no saddle between the frames results;
 //! - [`refine`]: curve and sites together, by variable projection;
-//! - [`check`]: a spike between the samples sends the fit back to the next layout in reserve.
+//! - [`check`]: a spike between the samples sends the fit back to the next layout in reserve;
+//! - [`drag`]: a few steps from the last state while a pin is moved.
 //!
 //! The plane is measured in radii of the unpinned layout: its frames have a root mean square distance of
 //! 1 from their centre.
 
 mod check;
+mod drag;
 mod layout;
 mod refine;
 mod samples;
@@ -22,14 +24,14 @@ mod samples;
 use faer::{Mat, MatRef};
 
 use self::layout::{Candidate, Order};
-use self::refine::{Draft, FIRM, LOOSE, QUICK};
+use self::refine::{Draft, LOOSE, firm};
 use self::samples::{Curve, Samples};
 use super::b_spline::Point;
-use super::layout::Stop;
 use super::variable_projection::Plate;
 use crate::task::{Cancelled, Task};
 
 pub use check::Quality;
+pub use drag::{Drag, Moving};
 pub use layout::Choice;
 
 /// Fidelity of an ordered fit.
@@ -65,8 +67,9 @@ pub struct Fit {
 }
 
 /// A motion with its samples, and the layouts that are worth refining.
-pub struct Motion<'a> {
-    frames: MatRef<'a, f64>,
+#[derive(Debug, Clone)]
+pub struct Motion {
+    frames: Mat<f64>,
     floor: f64,
     samples: Samples,
     order: Order,
@@ -76,25 +79,19 @@ pub struct Motion<'a> {
     trial: Option<Draft>,
 }
 
-/// While a pin is dragged the layout is followed for so long.
-const FOLLOW: Stop = Stop {
-    change: 1e-3,
-    steps: 12,
-};
-
-impl<'a> Motion<'a> {
+impl Motion {
     /// Lays out `frames` (n x m, n >= 3, m >= 1, not all equal) and chooses a layout: the first that a
     /// short refinement at the usual fidelity (k = .8n, l = .6n) makes good. `floor` is what the m
     /// coordinates leave out of the motion, relative to its spread.
     ///
     /// # Errors
     /// The task was cancelled.
-    pub fn new(frames: MatRef<'a, f64>, floor: f64, task: &Task) -> Result<Self, Cancelled> {
+    pub fn new(frames: MatRef<'_, f64>, floor: f64, task: &Task) -> Result<Self, Cancelled> {
         let samples = Samples::new(frames);
         let order = Order::new(&samples);
         let mut motion = Motion {
             candidates: layout::candidates(&order, &samples, floor, task)?,
-            frames,
+            frames: frames.to_owned(),
             floor,
             samples,
             order,
@@ -105,31 +102,44 @@ impl<'a> Motion<'a> {
         Ok(motion)
     }
 
-    /// A motion whose layout is known: that of an earlier fit (n x 2, in its radii).
-    pub fn known(
-        frames: MatRef<'a, f64>,
+    /// The same, but with a layout chosen `before` (for other fidelity, or nearly the same frames) kept
+    /// unless it has a spike now: a map that somebody knows does not change for a little.
+    ///
+    /// # Errors
+    /// The task was cancelled.
+    pub fn near(
+        frames: MatRef<'_, f64>,
         floor: f64,
-        choice: Choice,
-        (layout, radius): (MatRef<'_, f64>, f64),
-    ) -> Self {
+        before: Choice,
+        task: &Task,
+    ) -> Result<Self, Cancelled> {
         let samples = Samples::new(frames);
         let order = Order::new(&samples);
-        let layout = samples.layout_of(layout);
-        Motion {
-            candidates: vec![Candidate::known(choice, layout, radius)],
-            frames,
+        let mut motion = Motion {
+            candidates: vec![layout::known(&order, &samples, before, task)?],
+            frames: frames.to_owned(),
             floor,
             samples,
             order,
             chosen: 0,
             trial: None,
+        };
+        let quality = motion.choose(task)?;
+        if quality.is_some_and(|quality| !quality.spiked) {
+            return Ok(motion);
         }
+        Motion::new(frames, floor, task)
     }
 
     /// The chosen layout at the frames, n x 2, before any pins.
     pub fn layout(&self) -> Mat<f64> {
         self.samples
             .frames_of(self.candidates[self.chosen].layout.as_ref())
+    }
+
+    /// Its radius, the unit of the plane, in units of the motion.
+    pub fn radius(&self) -> f64 {
+        self.candidates[self.chosen].natural()
     }
 
     /// Which layout it is.
@@ -159,42 +169,19 @@ impl<'a> Motion<'a> {
         Ok(best)
     }
 
-    /// A few steps from `last` after its pins have moved (or come and gone): the layout follows, and
-    /// curve and sites with it.
-    ///
-    /// # Errors
-    /// The task was cancelled.
-    pub fn drag(&self, last: &Fit, pins: &[(usize, Point)], task: &Task) -> Result<Fit, Cancelled> {
-        let samples = &self.samples;
-        let curve = samples.curve(last.controls.nrows());
-        let before = samples.layout_of(last.layout.as_ref());
-        let natural = self.candidates[self.chosen].natural();
-        let from = Candidate::known(last.choice, before.clone(), natural);
-        let to = self
-            .order
-            .pinned(&from, &samples.layout_pins(pins), &FOLLOW, task)?;
-        let moved = samples.dense_layout((&to.layout - &before).as_ref());
-        let controls = &last.controls + curve.fitted.fit(moved.as_ref());
-        let controls = curve.through_pins(controls, pins);
-        let sites = carried(&last.plate.sites, &before, &to.layout);
-        let draft = Draft::at(samples, &curve, controls, &sites);
-        let draft = draft.refined(samples, &curve, pins, QUICK, task)?;
-        Ok(self.fitted(draft, &curve, &to))
-    }
-
-    /// Chooses the first candidate that becomes good; the best of them where none does.
-    fn choose(&mut self, task: &Task) -> Result<(), Cancelled> {
+    /// Chooses the first candidate that becomes good; the best of them where none does. Returns how good.
+    fn choose(&mut self, task: &Task) -> Result<Option<Quality>, Cancelled> {
         let samples = &self.samples;
         let curve = samples.curve(samples.usual_controls());
-        let mut least = f64::INFINITY;
+        let mut chosen: Option<Quality> = None;
         for (index, candidate) in self.candidates.iter().enumerate() {
             let draft = Draft::over(samples, &curve, samples.usual_sites(), candidate, &[])
                 .refined(samples, &curve, &[], LOOSE, task)?;
             let quality = draft.quality(samples, &curve, self.floor);
             task.step();
             // The earlier ones are better maps: they are kept unless another is clearly better.
-            if quality.good || quality.between < 0.8 * least {
-                least = quality.between;
+            if quality.good || chosen.is_none_or(|best| quality.between < 0.8 * best.between) {
+                chosen = Some(quality);
                 self.chosen = index;
                 self.trial = Some(draft);
             }
@@ -202,7 +189,7 @@ impl<'a> Motion<'a> {
                 break;
             }
         }
-        Ok(())
+        Ok(chosen)
     }
 
     /// Refines one candidate at the wanted fidelity.
@@ -210,12 +197,9 @@ impl<'a> Motion<'a> {
         let (samples, pins) = (&self.samples, &options.pins[..]);
         let curve = samples.curve(options.controls);
         let sample_pins = samples.layout_pins(pins);
-        let candidate = self.order.pinned(
-            &self.candidates[index],
-            &sample_pins,
-            &Stop::default(),
-            task,
-        )?;
+        let candidate = self
+            .order
+            .pinned(&self.candidates[index], &sample_pins, task)?;
         let begun = self.trial.as_ref().filter(|trial| {
             let size = (trial.controls.nrows(), trial.plate.sites.nrows());
             index == self.chosen && pins.is_empty() && size == (options.controls, options.sites)
@@ -226,21 +210,21 @@ impl<'a> Motion<'a> {
                 .refined(samples, &curve, pins, LOOSE, task)?,
         };
         task.step();
-        let draft = draft.refined(samples, &curve, pins, FIRM, task)?;
+        let draft = draft.refined(samples, &curve, pins, firm(samples.frames), task)?;
         task.step();
         Ok(self.fitted(draft, &curve, &candidate))
     }
 
     /// A spiked fit refined once more with twice as many samples: what was between them is now met.
     fn despiked(&self, fit: Fit, options: &Options, task: &Task) -> Result<Fit, Cancelled> {
-        let samples = Samples::at_rate(self.frames, 2 * self.samples.rate);
+        let samples = Samples::at_rate(self.frames.as_ref(), 2 * self.samples.rate);
         let curve = samples.curve(options.controls);
         let controls = fit.controls.clone();
         let draft = Draft::at(&samples, &curve, controls, &fit.plate.sites).refined(
             &samples,
             &curve,
             &[],
-            FIRM,
+            firm(samples.frames),
             task,
         )?;
         let quality = draft.quality(&samples, &curve, self.floor);
@@ -284,24 +268,56 @@ pub fn fit(
     Motion::new(frames, floor, task)?.fit(options, task)
 }
 
-/// Sites moved by what the layout's points near them moved (weights 1/distance^2).
-fn carried(sites: &Mat<f64>, from: &Mat<f64>, to: &Mat<f64>) -> Mat<f64> {
-    let mut carried = sites.clone();
-    for j in 0..sites.nrows() {
-        let (mut total, mut shift) = (0.0, [0.0; 2]);
-        for i in 0..from.nrows() {
-            let (dx, dy) = (from[(i, 0)] - sites[(j, 0)], from[(i, 1)] - sites[(j, 1)]);
-            let weight = 1.0 / (dx * dx + dy * dy + 1e-6);
-            total += weight;
-            for a in 0..2 {
-                shift[a] += weight * (to[(i, a)] - from[(i, a)]);
+/// The fit whose plane is that of the two leading coordinates, g being the identity there (and 0 in the
+/// others): for `frames` (n x m, n >= 2) with m <= 2, where nothing between them can go wrong, or with
+/// fewer sites than a surface needs. Its unit is that of the motion; three sites without weight lie on
+/// the curve of `controls` control points (>= 4).
+pub fn flat(frames: MatRef<'_, f64>, floor: f64, controls: usize) -> Fit {
+    let samples = Samples::new(frames);
+    let curve = samples.curve(controls);
+    let leading = |of: MatRef<'_, f64>| {
+        let width = of.ncols();
+        Mat::from_fn(
+            of.nrows(),
+            2,
+            |i, a| if a < width { of[(i, a)] } else { 0.0 },
+        )
+    };
+    let controls = curve.fitted.fit(leading(samples.dense.as_ref()).as_ref());
+    let mut plate = Plate::zero(3, frames.ncols());
+    plate.sites = curve.even_points(controls.as_ref(), 3);
+    for a in 0..frames.ncols().min(2) {
+        plate.affine[(1 + a, a)] = 1.0;
+    }
+    let draft = Draft::of(controls, plate);
+    Fit {
+        quality: draft.quality(&samples, &curve, floor),
+        layout: leading(frames),
+        radius: 1.0,
+        choice: Choice {
+            tau: 0.0,
+            theta: 0.0,
+        },
+        controls: draft.controls,
+        plate: draft.plate,
+        evaluations: 0,
+        converged: true,
+    }
+}
+
+impl Fit {
+    /// Moves the plane: every place by `shift` radii, the motion unchanged.
+    pub fn shift(&mut self, shift: Point) {
+        for a in 0..2 {
+            for places in [&mut self.controls, &mut self.plate.sites, &mut self.layout] {
+                let places = places.col_as_slice_mut(a);
+                places.iter_mut().for_each(|x| *x += shift[a]);
+            }
+            for c in 0..self.plate.affine.ncols() {
+                self.plate.affine[(0, c)] -= shift[a] * self.plate.affine[(1 + a, c)];
             }
         }
-        for a in 0..2 {
-            carried[(j, a)] += shift[a] / total;
-        }
     }
-    carried
 }
 
 #[cfg(test)]

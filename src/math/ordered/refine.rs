@@ -30,11 +30,13 @@ pub(super) const LOOSE: Round = Round {
     evaluations: 15,
     bending: 0.3,
 };
-/// To the end.
-pub(super) const FIRM: Round = Round {
-    evaluations: 25,
-    bending: 0.05,
-};
+/// To the end, for n frames: short motions cost little and are taken further.
+pub(super) fn firm(frames: usize) -> Round {
+    Round {
+        evaluations: (5000 / frames.max(1)).clamp(25, 60),
+        bending: 0.05,
+    }
+}
 /// While a pin is dragged.
 pub(super) const QUICK: Round = Round {
     evaluations: 3,
@@ -83,10 +85,16 @@ impl Draft {
     ) -> Self {
         let positions = curve.fitted.design().apply(controls.as_ref());
         let targets = samples.dense.as_ref();
+        let plate = variable_projection::fit_plate(positions.as_ref(), targets, sites.as_ref());
+        Draft::of(controls, plate)
+    }
+
+    /// A curve and a plate as they are; the curve is not held.
+    pub(super) fn of(controls: Mat<f64>, plate: Plate) -> Self {
         Draft {
-            plate: variable_projection::fit_plate(positions.as_ref(), targets, sites.as_ref()),
             anchor: controls.clone(),
             controls,
+            plate,
             hold: 0.0,
             evaluations: 0,
             converged: false,

@@ -13,6 +13,7 @@ const SHORT: usize = 64;
 const DENSE_LAYOUT: usize = 120;
 
 /// Times and the motion at them.
+#[derive(Debug, Clone)]
 pub(super) struct Samples {
     /// n.
     pub(super) frames: usize,
@@ -35,6 +36,7 @@ pub(super) struct Samples {
 }
 
 /// Designs of one number of control points at the samples.
+#[derive(Debug, Clone)]
 pub(super) struct Curve {
     length: f64,
     /// At the fitted samples.
@@ -88,12 +90,15 @@ impl Samples {
         Mat::from_fn(self.frames, 2, |i, a| layout[(i * self.layout_rate, a)])
     }
 
-    /// A layout of the frames at the layout's samples.
-    pub(super) fn layout_of(&self, frames: MatRef<'_, f64>) -> Mat<f64> {
-        match self.layout_rate {
-            1 => frames.to_owned(),
-            rate => through(frames, &times(self.frames, rate)),
-        }
+    /// Numbers of the frames (n x c) at the fitted samples.
+    pub(super) fn dense_of(&self, frames: Mat<f64>) -> Mat<f64> {
+        through(frames.as_ref(), &times(self.frames, self.rate))
+    }
+
+    /// Where the frames lie on a curve, n x 2.
+    pub(super) fn frames_on(&self, curve: &Curve, controls: MatRef<'_, f64>) -> Mat<f64> {
+        let frames = times(self.frames, 1);
+        UniformDesign::new(curve.controls(), curve.length, &frames).apply(controls)
     }
 
     /// Pins of frames as pins of the layout's samples.
