@@ -86,6 +86,7 @@ fn run(rows: &dyn Rows, (k, l, m): (usize, usize, usize)) -> ([Duration; 4], Sub
         layout,
         distinct: pose.distinct,
         merged: pose.spread,
+        ordered: None,
         pose: pose.signal,
         time,
     };

@@ -116,7 +116,7 @@ fn fit(kept: &Sequence, pins: Vec<Pin>) -> Result<Loom> {
     let options = FitOptions {
         method: Method::Ch12,
         pins,
-        ..FitOptions::default()
+        ..FitOptions::ch12()
     };
     support::fit_with(kept, [n + 2, n, n - 1], options)
 }

@@ -50,6 +50,7 @@ impl FitRequest {
             tolerance: self.tolerance.unwrap_or(default.tolerance),
             pins: self.pins.iter().map(pin).collect(),
             alpha: self.alpha.unwrap_or(default.alpha),
+            near: None,
             root: self.root.as_deref().map_or(Ok(None), root)?,
             fps: self.fps,
             left_out: default.left_out,

@@ -68,7 +68,7 @@ impl Drag {
         let (controls, plate) = last;
         let before = samples.frames_on(curve, controls);
         let after = held(&self.distances, before.as_ref(), pins, &FOLLOW, task)?;
-        let moved = samples.dense_of(&after - &before);
+        let moved = samples.dense_of(&(&after - &before));
         let controls = curve.through_pins(controls + curve.fitted.fit(moved.as_ref()), pins);
         let sites = carried(&plate.sites, &before, &after);
         let draft = Draft::at(samples, curve, controls, &sites)

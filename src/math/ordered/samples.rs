@@ -91,7 +91,7 @@ impl Samples {
     }
 
     /// Numbers of the frames (n x c) at the fitted samples.
-    pub(super) fn dense_of(&self, frames: Mat<f64>) -> Mat<f64> {
+    pub(super) fn dense_of(&self, frames: &Mat<f64>) -> Mat<f64> {
         through(frames.as_ref(), &times(self.frames, self.rate))
     }
 
