@@ -13,7 +13,7 @@ use meshloom::plot::{Chart, Panel, Scale, Series, Style, Theme, Tint, chart};
 use support::{Figure, table};
 
 /// Captures that are measured where none is given.
-const DEMOS: [&str; 3] = ["gallop", "walk", "bar"];
+const DEMOS: [&str; 5] = ["gallop", "walk", "flag", "jelly", "bar"];
 
 /// Shares of the full numbers, in percent.
 const SHARES: [usize; 7] = [10, 25, 40, 55, 70, 85, 100];

@@ -229,3 +229,18 @@ pub(super) fn carve(
         field.1 * share - tool.1 * (1.0 - share),
     )
 }
+
+/// Both, with a fillet of about `blend`.
+pub(super) fn smooth_union(
+    one: (f64, Vector3<f64>),
+    other: (f64, Vector3<f64>),
+    blend: f64,
+) -> (f64, Vector3<f64>) {
+    let (a, b) = (one.0, other.0);
+    let root = ((a - b) * (a - b) + blend * blend).sqrt();
+    let share = 0.5 * (1.0 - (a - b) / root);
+    (
+        0.5 * (a + b - root),
+        one.1 * share + other.1 * (1.0 - share),
+    )
+}

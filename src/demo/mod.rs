@@ -7,6 +7,7 @@ mod bar;
 mod bend;
 mod cactus;
 mod curve;
+mod face;
 mod flag;
 mod horse;
 mod implicit;
@@ -18,6 +19,7 @@ mod surface_nets;
 use crate::mesh::Sequence;
 
 pub use bar::pose as bar_pose;
+pub use face::NAMES as FACE_POSES;
 
 /// What the frames of a capture are to each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -78,6 +80,14 @@ pub const DEMOS: &[Demo] = &[
         travels: false,
         view: [0.5, 0.2],
         generate: jelly::generate,
+    },
+    Demo {
+        name: "face",
+        about: "a head with nine expressions: neutral, anger, cry, grin, laugh, rage, sad, smile, surprise",
+        kind: Kind::Poses,
+        travels: false,
+        view: [0.3, 0.05],
+        generate: face::generate,
     },
     Demo {
         name: "bar",

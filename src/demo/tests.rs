@@ -227,3 +227,53 @@ fn the_cactus_is_closed_and_bends_as_pappus_says() {
         assert!(smallest_face_share(topology, cactus.frame(pose)) > 0.05);
     }
 }
+
+/// Where the front of the face (z > 6 cm) shows each expression, in metres against the neutral pose.
+#[test]
+fn faces_do_what_their_names_say() {
+    let face = capture("face");
+    assert!(is_closed_manifold(face.topology()));
+    assert_eq!(face.frames(), FACE_POSES.len());
+    let pose = |name: &str| {
+        let index = FACE_POSES.iter().position(|&known| known == name).unwrap();
+        face.frame(index).as_chunks::<3>().0
+    };
+    let neutral = pose("neutral");
+    // mean rise of what lies within 1 cm of a place of the neutral face, on both sides
+    let rise = |name: &str, place: [f32; 3]| {
+        let near = |point: &[f32; 3]| {
+            let offset = [
+                point[0].abs() - place[0],
+                point[1] - place[1],
+                point[2] - place[2],
+            ];
+            offset.iter().map(|value| value * value).sum::<f32>() < 1e-4
+        };
+        let moved: Vec<f32> = neutral
+            .iter()
+            .zip(pose(name))
+            .filter(|(rest, _)| near(rest))
+            .map(|(rest, now)| now[1] - rest[1])
+            .collect();
+        assert!(!moved.is_empty());
+        moved.iter().sum::<f32>() / moved.len() as f32
+    };
+    let (corner, brow, chin) = (
+        [0.028, -0.049, 0.078],
+        [0.012, 0.043, 0.094],
+        [0.0, -0.09, 0.084],
+    );
+    for happy in ["smile", "grin", "laugh"] {
+        assert!(rise(happy, corner) > 0.004, "{happy}");
+    }
+    for unhappy in ["sad", "cry", "anger"] {
+        assert!(rise(unhappy, corner) < -0.004, "{unhappy}");
+    }
+    for frowning in ["anger", "rage"] {
+        assert!(rise(frowning, brow) < -0.008, "{frowning}");
+    }
+    for open in ["surprise", "laugh", "rage"] {
+        assert!(rise(open, chin) < -0.015, "{open}");
+    }
+    assert!(rise("surprise", brow) > 0.01 && rise("sad", brow) > 0.008);
+}

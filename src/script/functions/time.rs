@@ -243,7 +243,7 @@ mod functions {
     ///
     /// ```rhai
     /// let bar = fit(demo("bar"), #{ tolerance: 0.05 });
-    /// check(bar.smooth(3, 8, 0.5).frames == bar.frames, "as many frames");
+    /// check(bar.smooth(1, bar.frames, 0.5).frames == bar.frames, "as many frames");
     /// ```
     #[rhai_fn(name = "smooth", return_raw)]
     pub fn smooth(
@@ -321,7 +321,7 @@ mod functions {
         Ok(Clock(Times::Count(count(&n, "n", 1)?)))
     }
 
-    /// `x` times as many frames, for `resample`.
+    /// x times as many frames, for `resample`.
     ///
     /// `rate(x)`
     ///
