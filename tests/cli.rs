@@ -630,7 +630,7 @@ fn real_captures_are_fitted_as_well_as_the_paper_says() {
     );
     meshloom(folder.path(), &format!("convert {input} -o all.pc2")).done();
     let fit = format!(
-        "fit all.pc2 --mesh {} -o horse.loom --json --tolerance 0.02",
+        "fit all.pc2 --mesh {} -o horse.loom --json --method ch12 --tolerance 0.02",
         horse.join("base.obj").display()
     );
     let report = meshloom(folder.path(), &fit).done().object();

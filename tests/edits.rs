@@ -29,7 +29,7 @@ fn fitted(name: &str, (k, l, m): (usize, usize, usize)) -> Option<Loom> {
         sites: Some(l),
         modes: Some(m),
         left_out: false,
-        ..FitOptions::default()
+        ..FitOptions::ch12()
     };
     let fitted = fit(&sequence, &options, &Task::default()).expect("the capture is sound");
     Some(fitted.output)

@@ -65,7 +65,7 @@ fn exact(capture: &Sequence, space: &str) -> Loom {
         sites: Some(n),
         modes: Some(n - 1),
         left_out: false,
-        ..FitOptions::default()
+        ..FitOptions::ch12()
     };
     fit(capture, &options, &Task::default()).unwrap().output
 }

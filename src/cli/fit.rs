@@ -171,6 +171,12 @@ pub(super) fn summary(session: &Session, title: &str, report: &FitReport) -> Str
             ),
         ),
     ];
+    if let Some(positions) = error.positions.filter(|_| report.space != "vertices") {
+        rows.push((
+            "in positions",
+            format!("{} of the motion of the vertices", of(positions)),
+        ));
+    }
     if let Some(left_out) = &report.left_out {
         rows.push((
             "between frames",

@@ -1,19 +1,24 @@
 //! `meshloom info INPUT..`: what a capture is.
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::args::Input;
 use super::report;
 use super::session::{Outcome, Session};
 use crate::diag::Result;
 use crate::mesh::Bounds;
-use crate::pipeline::describe;
+use crate::pipeline::{SpaceReport, best_space, compare_spaces, describe};
 
 /// Say what a capture holds
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     #[command(flatten)]
     input: Input,
+
+    /// Fit every second frame in each shape space and measure the frames between: which suits this
+    /// capture
+    #[arg(long)]
+    spaces: bool,
 }
 
 pub(super) fn run(args: &Args, session: &Session) -> Result<Outcome> {
@@ -39,11 +44,60 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<Outcome> {
         ("to", corner(|bounds| bounds.max)),
         ("format", format!("{}, {size} in {files}", what.format)),
     ];
+    let mut object = json!(what);
+    let mut text = report::table(session.style, &title(args), &rows);
+    if args.spaces {
+        let sequence = capture.content.sequence(&session.task)?;
+        let found = compare_spaces(&sequence, &session.task)?;
+        let names: Vec<&str> = found.iter().map(|space| space.name).collect();
+        let seconds = session.progress.seconds(&names);
+        object["spaces"] = found.iter().map(|space| as_data(space, &seconds)).collect();
+        object["best_space"] = json!(best_space(&found).map(|space| space.name));
+        text += &spaces_table(session, &found, &seconds);
+    }
     Ok(Outcome {
-        object: json!(what),
-        report: report::table(session.style, &title(args), &rows),
+        object,
+        report: text,
         ..Outcome::default()
     })
+}
+
+fn as_data(space: &SpaceReport, seconds: &Value) -> Value {
+    json!({
+        "space": space.name,
+        "dimension": space.dimension,
+        "modes": space.modes,
+        "numbers": space.numbers,
+        "left_out": { "psi": space.psi, "linear": space.linear, "cubic": space.cubic },
+        "large_turns": space.large_turns,
+        "seconds": seconds[space.name],
+    })
+}
+
+/// Errors between frames in each space, and which suits the capture.
+fn spaces_table(session: &Session, found: &[SpaceReport], seconds: &Value) -> String {
+    let rows: Vec<(&str, String)> = found
+        .iter()
+        .map(|space| {
+            let of = |error: f64| report::percent(100.0 * error);
+            let size = report::bytes(8 * space.numbers as u64);
+            let took = report::number(seconds[space.name].as_f64().unwrap_or(0.0));
+            let text = format!(
+                "psi {:<8} linear {:<8} cubic {:<8} m = {:<4} {size:>9} {took:>6} s",
+                of(space.psi),
+                of(space.linear),
+                of(space.cubic),
+                space.modes,
+            );
+            (space.name, text)
+        })
+        .collect();
+    let title = "between frames, in vertex positions";
+    let mut text = report::table(session.style, title, &rows);
+    if let Some(best) = best_space(found) {
+        text += &format!("  {} suits it best: {}\n", best.name, best.summary);
+    }
+    text
 }
 
 fn title(args: &Args) -> String {

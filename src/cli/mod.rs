@@ -26,6 +26,7 @@ mod open;
 mod plot;
 mod run;
 mod sample;
+mod transfer;
 mod watch;
 
 use std::process::ExitCode;
@@ -60,6 +61,7 @@ commands! {
     demo Demo,
     fit Fit,
     sample Sample,
+    transfer Transfer,
     open Open,
     run Run,
     watch Watch,

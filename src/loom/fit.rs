@@ -8,7 +8,7 @@ use super::fitted::{Fitted, fit_rows};
 use super::frames::{Frames, travel_warning};
 use super::pins::{self, Pin};
 use super::report::FitReport;
-use super::{Layout, Loom, Parts, warnings};
+use super::{Layout, Loom, Parts, position_error, warnings};
 use crate::diag::{Diagnostic, Result, Warned};
 use crate::math::pca::{Rows, Table};
 use crate::mesh::{FrameSource, Sequence};
@@ -175,8 +175,24 @@ pub fn fit(sequence: &Sequence, options: &FitOptions, task: &Task) -> Result<War
         report: Arc::new(report),
     })?;
     Ok(Warned {
-        output: loom,
+        output: measured(&loom, &frames, task)?,
         warnings,
+    })
+}
+
+/// The loom with its error in vertex positions.
+fn measured(loom: &Loom, frames: &Frames<'_>, task: &Task) -> Result<Loom> {
+    let mut report = FitReport::clone(loom.report());
+    report.error.positions = Some(match loom.space().is_identity() {
+        true => report.error.total,
+        false => {
+            task.phase("positions", 0);
+            position_error::relative(loom, frames, task)?
+        }
+    });
+    Loom::new(Parts {
+        report: Arc::new(report),
+        ..loom.parts()
     })
 }
 

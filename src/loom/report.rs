@@ -70,6 +70,10 @@ pub struct Errors {
     pub time: f64,
     /// ||z_i - psi(i)||.
     pub total: f64,
+    /// The same in vertex positions, which all shape spaces share; none where it was not measured. In
+    /// `vertices` it is the total.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub positions: Option<f64>,
 }
 
 /// Relative errors at left-out frames of fits to every second frame.
@@ -234,6 +238,7 @@ impl Errors {
             pose: subspace.relative(pose.sqrt()),
             time: time_error(positions, &passed),
             total: subspace.relative((shape * shape + total).sqrt()),
+            positions: None,
         }
     }
 }

@@ -17,6 +17,8 @@ pub mod plot;
 mod request;
 mod save;
 mod sheet;
+mod spaces;
+mod transfer;
 mod value;
 mod workbench;
 
@@ -33,6 +35,8 @@ pub use picture::{PictureFormat, save_picture};
 pub use request::FitRequest;
 pub use save::{Saved, save};
 pub use sheet::contact_sheet;
+pub use spaces::{SpaceReport, best_space, compare_spaces};
+pub use transfer::open_examples;
 pub use value::{Frames, Keyed, LoomValue, Picture, Shape, ShapeValue, Source, Value};
 pub use workbench::{Step, Workbench};
 

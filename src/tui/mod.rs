@@ -6,7 +6,7 @@
 //!                                          panels draw State
 //! ```
 //!
-//! **Invariants:** [`update`](update::update) decides and draws nothing; panels draw and change nothing; work longer
+//! **Invariants:** `update` decides and draws nothing; panels draw and change nothing; work longer
 //! than a frame runs on worker threads, and answers to questions that are no longer asked are dropped.
 
 mod event;

@@ -153,6 +153,12 @@ impl Lines {
             .ok()
     }
 
+    /// The next line, if it comes soon.
+    pub fn soon(&mut self) -> Option<Value> {
+        let soon = std::time::Duration::from_millis(500);
+        self.lines.recv_timeout(soon).ok()
+    }
+
     /// The next line that `wanted` accepts.
     pub fn find(&mut self, wanted: impl Fn(&Value) -> bool) -> Option<Value> {
         std::iter::from_fn(|| self.next()).find(|line| wanted(line))

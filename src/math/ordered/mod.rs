@@ -6,11 +6,11 @@
 //! \[0, n-1\] and a thin-plate spline g from the plane to R^m with free sites, so that g(f(t)) is near
 //! S(t) for *all* t, not for the frames alone:
 //!
-//! - [`layout`]: the frames are laid out by distances along the motion (geodesics of the order graph),
+//! - `layout`: the frames are laid out by distances along the motion (geodesics of the order graph),
 //!   then walked towards plain distances as long as no saddle between the frames results;
-//! - [`refine`]: curve and sites together, by variable projection;
-//! - [`check`]: a spike between the samples sends the fit back to the next layout in reserve;
-//! - [`drag`]: a few steps from the last state while a pin is moved.
+//! - `refine`: curve and sites together, by variable projection;
+//! - `check`: a spike between the samples sends the fit back to the next layout in reserve;
+//! - `drag`: a few steps from the last state while a pin is moved.
 //!
 //! The plane is measured in radii of the unpinned layout: its frames have a root mean square distance of
 //! 1 from their centre.

@@ -6,9 +6,9 @@
 //! ```
 //!
 //! X is N x m, the samples to be met at N times; A is the N x k design of the curve
-//! ([`UniformDesign`]); B the N x l design of the plate ([`design`]); P and E are quadratic forms of
+//! ([`UniformDesign`]); B the N x l design of the plate (`design`); P and E are quadratic forms of
 //! the caller: how firmly the curve keeps its place, and what bending costs. Levenberg-Marquardt
-//! steps with Kaufman's Jacobian (1975), which is never formed ([`normal`]).
+//! steps with Kaufman's Jacobian (1975), which is never formed (`normal`).
 
 mod design;
 mod normal;
