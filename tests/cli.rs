@@ -477,7 +477,10 @@ fn fit_reports_what_compare_measures() {
     ] {
         assert!(present.contains(&key), "{key} in {present:?}");
     }
-    assert_eq!(keys(&report["error"]), ["pose", "shape", "time", "total"]);
+    assert_eq!(
+        keys(&report["error"]),
+        ["pose", "positions", "shape", "time", "total"]
+    );
     assert_eq!(keys(&report["left_out"]), ["cubic", "linear", "psi"]);
     assert_eq!(
         keys(&report["seconds"]),
