@@ -153,13 +153,14 @@ impl<'a> Watcher<'a> {
         let mut listed = None::<Instant>;
         let mut look = true;
         loop {
-            let old = listed.is_none_or(|at: Instant| at.elapsed() >= RELIST);
-            if old || look && listed.is_none_or(|at| at.elapsed() >= BREATH) {
+            let age = listed.map_or(RELIST, |at| at.elapsed());
+            // What seems to have settled is listed once more before it is taken: events get lost.
+            let due = look || self.inbox.wakes().is_some_and(|at| at <= begun.elapsed());
+            if age >= RELIST || due && age >= BREATH {
                 self.list(begun.elapsed());
                 self.reload();
                 (listed, look) = (Some(Instant::now()), false);
             }
-            self.inbox.settle(begun.elapsed());
             while let Some(job) = self.inbox.next_job() {
                 let (shop, recipe, task) =
                     (self.shop, self.recipe.clone(), self.session.task.sibling());
@@ -191,7 +192,7 @@ impl<'a> Watcher<'a> {
             .wakes()
             .map_or(RELIST, |at| at.saturating_sub(now));
         let longest = if running || look { LOOK } else { RELIST };
-        settles.clamp(Duration::from_millis(1), longest)
+        settles.clamp(LOOK.min(longest), longest)
     }
 
     /// Lists the folder. One that has vanished is waited for: it may return.
