@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use super::open::Content;
 use crate::diag::{Diagnostic, Result};
 use crate::mesh::{FrameSource, Sequence};
@@ -28,15 +30,24 @@ impl Content {
     }
 }
 
-fn in_memory(source: &dyn FrameSource, task: &Task) -> Result<Sequence> {
+/// All frames of `source`, fetched in parallel.
+///
+/// # Errors
+/// A frame cannot be computed; cancellation.
+pub(super) fn in_memory(source: &dyn FrameSource, task: &Task) -> Result<Sequence> {
     let width = 3 * source.topology().vertices();
     let mut positions = vec![0.0; source.frames() * width];
-    for (frame, row) in positions.chunks_exact_mut(width.max(1)).enumerate() {
-        task.check()?;
-        source.read_frame(frame, row).map_err(|error| {
-            Diagnostic::error(format!("the frame cannot be computed: {error}")).at_frame(frame + 1)
+    let rows = positions.par_chunks_exact_mut(width.max(1));
+    rows.enumerate()
+        .try_for_each(|(frame, row)| -> Result<()> {
+            task.check()?;
+            let read = source.read_frame(frame, row);
+            read.map_err(|error| {
+                Diagnostic::error(format!("the frame cannot be computed: {error}"))
+                    .at_frame(frame + 1)
+            })?;
+            Ok(())
         })?;
-    }
     let topology = Arc::clone(source.topology());
     Ok(Sequence::new(topology, positions, source.fps()))
 }

@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use serde::Serialize;
 
+use super::frames::in_memory;
 use super::key::Key;
 use super::memory::{Made, Memory, Remembered};
 use super::request::FitRequest;
@@ -486,33 +487,6 @@ fn named(paths: &[PathBuf]) -> String {
         .first()
         .map(|path| path.display().to_string())
         .unwrap_or_default()
-}
-
-/// All frames of `source` in memory.
-fn in_memory(source: &dyn FrameSource, task: &Task) -> Result<Sequence> {
-    use rayon::prelude::*;
-    let width = 3 * source.topology().vertices();
-    let mut positions = vec![0.0; width * source.frames()];
-    let read = |(frame, positions): (usize, &mut [f32])| -> Result<()> {
-        task.check()?;
-        source.read_frame(frame, positions).map_err(|error| {
-            Diagnostic::error(error.to_string())
-                .at_frame(frame + 1)
-                .into()
-        })
-    };
-    if width > 0 {
-        positions
-            .par_chunks_exact_mut(width)
-            .enumerate()
-            .map(read)
-            .collect::<Result<()>>()?;
-    }
-    Ok(Sequence::new(
-        Arc::clone(source.topology()),
-        positions,
-        source.fps(),
-    ))
 }
 
 fn no_demo(name: &str) -> Box<Diagnostic> {
