@@ -44,6 +44,10 @@ pub struct PoseSpace {
 /// Most numbered frames on a map, besides pins and shown frames.
 const MOST_NUMBERS: f64 = 12.0;
 
+/// A site farther from the motion than this share of the motion's box is not framed, for it would make
+/// everything else small; an arrow at the edge points to it.
+const NEAR: f64 = 0.3;
+
 /// The map in a picture of `width` x `height` pixels, and where its data lies in it. Without any point
 /// it shows the unit square; a single point lies in the middle. Legend and colour bar stand outside
 /// the data and are left out where there is no room for them.
@@ -62,10 +66,14 @@ pub fn pose_space(map: &PoseSpace, width: f32, height: f32, theme: &Theme) -> (S
     let [x, y] = map.window.unwrap_or_else(|| map.ranges());
     let (plane, x, y) = Plane::isometric_in(room, x, y, theme);
     plane.draw_grid(&mut scene, theme, &x, &y);
-    if map.window.is_some() {
+    let beyond = map.sites_beyond(&plane);
+    if map.window.is_some() || !beyond.is_empty() {
         scene.clipped(plane.area, |scene| map.draw(scene, &plane, theme));
     } else {
         map.draw(&mut scene, &plane, theme);
+    }
+    if map.window.is_none() {
+        draw_beyond(&mut scene, plane.area, &beyond, theme);
     }
     plane.draw_frame(&mut scene, theme);
     plane.draw_x(&mut scene, theme, &x, "p₁ (layout units)");
@@ -78,15 +86,10 @@ pub fn pose_space(map: &PoseSpace, width: f32, height: f32, theme: &Theme) -> (S
 }
 
 impl PoseSpace {
+    /// Everything that is always framed: all but the sites.
     fn points(&self) -> impl Iterator<Item = [f64; 2]> + '_ {
         let pins = self.pins.iter().map(|(_, at)| at);
-        let lists = [
-            &self.curve,
-            &self.frames,
-            &self.sites,
-            &self.controls,
-            &self.marked,
-        ];
+        let lists = [&self.curve, &self.frames, &self.controls, &self.marked];
         let pictures = self.pictures.iter().flat_map(|(at, wide, _)| {
             let half = 0.5 * wide;
             [[at[0] - half, at[1] - half], [at[0] + half, at[1] + half]]
@@ -120,11 +123,28 @@ impl PoseSpace {
 
     /// Ranges of everything shown, with a margin for marks; equal centres for lone points.
     fn ranges(&self) -> [[f64; 2]; 2] {
-        let along = |axis: usize| range_of(self.points().map(|point| point[axis]));
-        let (Some(x), Some(y)) = (along(0), along(1)) else {
+        let box_of = |points: &[[f64; 2]]| {
+            let along = |axis: usize| range_of(points.iter().map(|point| point[axis]));
+            Some([along(0)?, along(1)?])
+        };
+        let mut points: Vec<[f64; 2]> = self.points().collect();
+        let Some(motion) = box_of(&points).or_else(|| box_of(&self.sites)) else {
             return [[0.0, 1.0]; 2];
         };
-        with_margin([x, y], 0.06)
+        let near = with_margin(motion, NEAR);
+        let inside = |point: &&[f64; 2]| {
+            let mut axes = near.iter().zip(point.iter());
+            axes.all(|(range, at)| (range[0]..=range[1]).contains(at))
+        };
+        points.extend(self.sites.iter().filter(inside));
+        with_margin(box_of(&points).unwrap_or(motion), 0.06)
+    }
+
+    /// Sites outside the plane's area, in pixels.
+    fn sites_beyond(&self, plane: &Plane) -> Vec<Point> {
+        let mut sites = pixels(plane, &self.sites);
+        sites.retain(|at| !plane.area.contains(*at));
+        sites
     }
 
     fn draw(&self, scene: &mut Scene, plane: &Plane, theme: &Theme) {
@@ -346,6 +366,21 @@ fn draw_all(scene: &mut Scene, plane: &Plane, theme: &Theme, mark: Mark, points:
     places.iter().for_each(|&at| mark.draw(scene, theme, at));
 }
 
+/// Arrows just inside the edge of `area`, each towards a site beyond it.
+fn draw_beyond(scene: &mut Scene, area: Rect, beyond: &[Point], theme: &Theme) {
+    let middle = [area.left + 0.5 * area.width, area.top + 0.5 * area.height];
+    let inset = 6.0 * theme.unit();
+    let reach = [area.width, area.height].map(|size| (0.5 * size - inset).max(0.0));
+    for site in beyond {
+        let way = [site[0] - middle[0], site[1] - middle[1]];
+        let share = (reach[0] / way[0].abs()).min(reach[1] / way[1].abs());
+        let at = [middle[0] + share * way[0], middle[1] + share * way[1]];
+        let length = way[0].hypot(way[1]);
+        let direction = [way[0] / length, way[1] / length];
+        arrow(scene, at, direction, theme.series[0], theme);
+    }
+}
+
 /// Points of a dense row that lie at least `gap` from the last one kept.
 fn spaced(mut points: Vec<Point>, gap: f32) -> Vec<Point> {
     points.dedup_by(|next, kept| distance(*next, *kept) < gap);
@@ -421,6 +456,7 @@ impl TimeBar {
 
 #[cfg(test)]
 mod tests {
+    use super::super::scene::Segment;
     use super::*;
 
     /// A spiral of `count` frames, everything on it.
@@ -464,6 +500,36 @@ mod tests {
             assert!(circles.contains(&plane.pixel(*at)));
             assert!(plane.area.contains(plane.pixel(*at)));
         }
+    }
+
+    #[test]
+    fn a_site_far_out_is_told_by_an_arrow_at_the_edge_and_moves_nothing() {
+        let near = spiral(12);
+        let mut far = near.clone();
+        far.sites.push([1e4, -2e4]);
+        let arrows = |scene: &Scene| -> Vec<Point> {
+            let tips = scene.items.iter().filter_map(|item| match item {
+                Item::Path {
+                    path,
+                    fill: Some(color),
+                    ..
+                } if *color == Theme::light().series[0] => match path.0.first() {
+                    Some(Segment::Move(tip)) => Some(*tip),
+                    _ => None,
+                },
+                _ => None,
+            });
+            tips.collect()
+        };
+        let (without, plane) = pose_space(&near, 640.0, 400.0, &Theme::light());
+        let (with, same) = pose_space(&far, 640.0, 400.0, &Theme::light());
+        assert_eq!(plane.pixel([3.0, 98.0]), same.pixel([3.0, 98.0]));
+        assert_eq!(arrows(&without).len(), 0);
+        let tips = arrows(&with);
+        assert_eq!(tips.len(), 1);
+        assert!(plane.area.contains(tips[0]));
+        let middle = 0.5 * (plane.area.top + plane.area.bottom());
+        assert!(tips[0][1] > middle, "the site lies below the map");
     }
 
     #[test]
