@@ -26,6 +26,7 @@ pub mod task;
 pub mod world;
 
 pub mod edit;
+pub mod inbetween;
 pub mod loom;
 pub mod math;
 pub mod mesh;

@@ -92,6 +92,34 @@ impl Times {
         }
     }
 
+    /// The times of a motion that is defined beyond its ends `first` and `last` too: lists and steps may
+    /// leave them. A rate counts frames to the unit of time; in seconds there is none.
+    ///
+    /// # Errors
+    /// No frames at all, or more than ten million; a number of frames a second.
+    pub fn between(&self, first: f64, last: f64) -> Result<Vec<f64>> {
+        self.check()?;
+        let span = last - first;
+        match self {
+            Times::Integers => steps(first, last, span, |i| i),
+            Times::Count(count) => {
+                let spans = count.saturating_sub(1).max(1) as f64;
+                let shares = evenly(1, *count)?;
+                let time = |i: usize| match i as f64 == spans {
+                    true => last,
+                    false => first + span * (i as f64 / spans),
+                };
+                Ok((0..shares.len()).map(time).collect())
+            }
+            Times::Rate(rate) => steps(first, last, span * rate, |i| i / rate),
+            Times::PerSecond(_) => Err(no_rate()),
+            Times::List(times) => Ok(times.clone()),
+            Times::Steps { start, end, step } => {
+                steps(*start, *end, (end - start) / step, |i| i * step)
+            }
+        }
+    }
+
     /// Rates and steps are above 0.
     fn check(&self) -> Result<()> {
         match *self {
@@ -279,6 +307,17 @@ impl FromStr for Times {
 mod tests {
     use super::*;
     use crate::loom::test_looms::{ring, travelling};
+
+    #[test]
+    fn times_between_any_ends_meet_them_and_may_leave_them() {
+        let between = |times: Times| times.between(-0.5, 2.5).unwrap();
+        assert_eq!(between(Times::Integers), [-0.5, 0.5, 1.5, 2.5]);
+        assert_eq!(between(Times::Count(3)), [-0.5, 1.0, 2.5]);
+        assert_eq!(between(Times::Count(1)), [-0.5]);
+        assert_eq!(between(Times::List(vec![9.0, -3.0])), [9.0, -3.0]);
+        assert_eq!(between("4:5:0.5".parse().unwrap()), [4.0, 4.5, 5.0]);
+        assert!(Times::Count(0).between(0.0, 1.0).is_err());
+    }
 
     #[test]
     fn frames_are_the_loom_at_their_times() {

@@ -217,7 +217,7 @@ fn methods() -> impl TypedValueParser<Value = Method> {
     PossibleValuesParser::new(names).map(move |name| method(&name).unwrap_or_default())
 }
 
-fn spaces() -> impl TypedValueParser<Value = String> {
+pub(super) fn spaces() -> impl TypedValueParser<Value = String> {
     PossibleValuesParser::new(SPACES.iter().map(|space| PossibleValue::new(space.name)))
 }
 

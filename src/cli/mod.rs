@@ -15,6 +15,7 @@ mod session;
 mod threads;
 
 mod compare;
+mod complete;
 mod completions;
 mod convert;
 mod demo;
@@ -62,6 +63,7 @@ commands! {
     fit Fit,
     sample Sample,
     transfer Transfer,
+    complete Complete,
     open Open,
     run Run,
     watch Watch,

@@ -196,10 +196,12 @@ impl CubicSpline {
 }
 
 /// A tridiagonal matrix whose rows are dominated by their diagonal; solved without pivots.
-struct Tridiagonal {
-    below: Vec<f64>,
-    diagonal: Vec<f64>,
-    above: Vec<f64>,
+pub(super) struct Tridiagonal {
+    /// The entry left of the diagonal of each row; the first is not used.
+    pub(super) below: Vec<f64>,
+    pub(super) diagonal: Vec<f64>,
+    /// The entry right of the diagonal of each row; the last is not used.
+    pub(super) above: Vec<f64>,
 }
 
 impl Tridiagonal {
@@ -224,7 +226,7 @@ impl Tridiagonal {
     }
 
     /// Replaces rows of m right sides by the solutions.
-    fn solve(mut self, right: &mut [f64], m: usize) {
+    pub(super) fn solve(mut self, right: &mut [f64], m: usize) {
         let n = self.diagonal.len();
         for i in 1..n {
             let factor = self.below[i] / self.diagonal[i - 1];

@@ -5,6 +5,7 @@ pub mod banded;
 pub mod cubic_spline;
 pub mod curve_join;
 pub mod growing_qr;
+pub mod key_spline;
 pub mod layout;
 pub mod least_squares;
 pub mod monotone;

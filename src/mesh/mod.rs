@@ -2,6 +2,7 @@
 //! coordinates, x y z interleaved, in the units of the file it came from.
 
 mod bounds;
+pub mod collapse;
 mod components;
 mod corners;
 pub mod dihedral;
@@ -13,6 +14,7 @@ mod patches;
 mod poisson;
 pub mod rigid_align;
 mod sequence;
+mod subdivide;
 mod topology;
 
 pub use bounds::Bounds;
@@ -25,4 +27,5 @@ pub use normals::{unit_vector, vertex_normals};
 pub use patches::grow_patches;
 pub use poisson::{Poisson, PoissonAnalysis, reference_triangles};
 pub use sequence::{FrameSource, Sequence};
+pub use subdivide::subdivide;
 pub use topology::{Attributes, Group, GroupKind, Topology, TopologyError};

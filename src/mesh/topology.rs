@@ -154,6 +154,17 @@ impl Topology {
         )
     }
 
+    /// So many vertices without faces.
+    pub fn points(vertices: usize) -> Self {
+        Topology {
+            vertices,
+            offsets: vec![0],
+            corners: Vec::new(),
+            triangles: Vec::new(),
+            attributes: Attributes::default(),
+        }
+    }
+
     /// The same connectivity with these attributes.
     #[must_use]
     pub fn with_attributes(mut self, attributes: Attributes) -> Self {

@@ -3,6 +3,7 @@
 
 mod edge_lengths;
 mod karni_gotsman;
+pub mod smoothness;
 mod stream;
 
 use std::fmt;

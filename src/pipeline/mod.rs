@@ -1,11 +1,13 @@
 //! The operations that the command line, recipes and the studio all call, over a World and a Task.
 
+mod complete;
 mod deliver;
 mod describe;
 mod find;
 mod frames;
 mod input;
 mod key;
+mod key_path;
 mod lanes;
 mod loom;
 mod memory;
@@ -22,11 +24,13 @@ mod transfer;
 mod value;
 mod workbench;
 
+pub use complete::{CompleteRequest, Velocities, complete, motion};
 pub use deliver::{deliver, plan_delivery};
 pub use describe::{Description, describe};
 pub use find::files;
 pub use input::{FrameRange, InputSpec};
 pub use key::{Key, KeyBuilder};
+pub use key_path::{KeyPath, key_map, key_path, plot_motion};
 pub use loom::{check_loom_output, is_loom, open_loom, save_loom};
 pub use memory::{Made, Memory, Remembered};
 pub use open::{Capture, Content, Origin, open};

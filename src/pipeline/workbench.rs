@@ -12,10 +12,14 @@ use super::key::Key;
 use super::memory::{Made, Memory, Remembered};
 use super::request::FitRequest;
 use super::value::{Frames, Keyed, LoomValue, Picture, Shape, ShapeValue, Source, content_key};
-use super::{InputSpec, PictureFormat, contact_sheet, files, open, open_loom, plot};
+use super::{
+    CompleteRequest, InputSpec, PictureFormat, complete, contact_sheet, files, open, open_loom,
+    plot,
+};
 use crate::demo::Demo;
 use crate::diag::{Diagnostic, Result, Warned};
 use crate::edit::{Edit, add_loop};
+use crate::inbetween::keys::same_faces;
 use crate::loom::Loom;
 use crate::loom::fit::fit;
 use crate::mesh::{FrameSource, Sequence};
@@ -368,6 +372,56 @@ impl Workbench {
         };
         self.charge(4 * shape.positions.len())?;
         Ok(Keyed::new(shape, one.key))
+    }
+
+    /// Shapes of one mesh as a capture of so many frames.
+    ///
+    /// # Errors
+    /// No shapes; shapes of another mesh than the first.
+    pub fn gather(&self, shapes: &[ShapeValue]) -> Result<Frames> {
+        let Some(first) = shapes.first() else {
+            return Diagnostic::error("no shapes are given")
+                .hint("name one or more: `[mesh(\"a.obj\"), mesh(\"b.obj\")]`")
+                .err();
+        };
+        let mut key = Key::of("gather");
+        let mut positions = Vec::new();
+        for (at, shape) in shapes.iter().enumerate() {
+            same_faces(&first.value.topology, &shape.value.topology, at + 1)?;
+            positions.extend_from_slice(&shape.value.positions);
+            key = key.key(shape.key);
+        }
+        self.charge(4 * positions.len())?;
+        let topology = Arc::clone(&first.value.topology);
+        Ok(Keyed::new(
+            Sequence::new(topology, positions, None),
+            key.finish(),
+        ))
+    }
+
+    /// Key poses completed to a motion, at the times asked for.
+    ///
+    /// # Errors
+    /// As [`complete`].
+    pub fn complete(&self, keys: &Frames, request: &CompleteRequest) -> Result<Warned<Frames>> {
+        let key = request.key(keys);
+        let frames = request.times_of(&keys.value)?.len();
+        self.charge(12 * keys.vertices() * frames)?;
+        let (completed, made) = self.memory.remember(key, || {
+            let mut warnings = Vec::new();
+            let frames = complete(&keys.value, request, &self.task)?.unpack(&mut warnings);
+            let sequence = in_memory(&frames, &self.task)?;
+            Ok(Opened {
+                sequence,
+                key,
+                warnings,
+            })
+        })?;
+        self.note("complete", format!("{} keys", keys.frames()), made);
+        Ok(Warned {
+            output: Keyed::new(completed.sequence.clone(), key),
+            warnings: completed.warnings.clone(),
+        })
     }
 
     /// A mesh as a capture of one frame.

@@ -110,6 +110,17 @@ impl Options {
             .transpose()
     }
 
+    /// true or false, if given.
+    pub(super) fn truth(&self, name: &str) -> Raw<Option<bool>> {
+        let truth = |value: &Dynamic| match value.as_bool() {
+            Ok(truth) => Ok(truth),
+            Err(kind) => raise(Diagnostic::error(format!(
+                "{name} must be true or false, got {kind}"
+            ))),
+        };
+        self.get(name).map(truth).transpose()
+    }
+
     /// A word, if given.
     pub(super) fn word(&self, name: &str) -> Raw<Option<String>> {
         let word = |value: &Dynamic| match value.clone().into_string() {

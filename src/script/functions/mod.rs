@@ -4,6 +4,7 @@
 // `export_module` takes functions that are `pub`, though nobody outside of the engine calls them.
 #![allow(unreachable_pub)]
 
+mod keys;
 mod output;
 mod params;
 mod pose;
@@ -31,6 +32,7 @@ pub(super) fn register(engine: &mut Engine) {
     time::register(engine);
     pose::register(engine);
     shape::register(engine);
+    keys::register(engine);
     output::register(engine);
 }
 

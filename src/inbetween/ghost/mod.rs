@@ -1,0 +1,331 @@
+//! Ghost meshes (X19 §4.3): splines and decoding run on a mesh of a few thousand triangles, the shapes of
+//! the full mesh follow it.
+//!
+//! One sequence of half-edge collapses serves all keys ([`crate::mesh::collapse`]), so the ghost's
+//! vertices are vertices of the mesh. How the ghost's triangles around each of its vertices have turned
+//! and stretched since the first key ([`turns`]) is carried to the mesh ([`Carrier`]): to its triangles,
+//! whose gradients are then integrated ([`Gradients`], deformation transfer), or to its vertices
+//! directly ([`Direct`]). What is missing at the keys is kept in the carried frames and blended by the
+//! spline's cardinal weights, so keys are reproduced.
+
+mod carrier;
+mod direct;
+mod gradients;
+mod residual;
+mod turns;
+
+use std::sync::Arc;
+
+use serde::Serialize;
+
+use super::keys::Keys;
+use crate::diag::{Diagnostic, Result, Warned};
+use crate::math::key_spline::KeySpline;
+use crate::mesh::collapse::{CollapseError, collapse};
+use crate::mesh::{Components, FrameSource, Topology};
+use carrier::Walk;
+use direct::Direct;
+use gradients::Gradients;
+use turns::Turns;
+
+/// Triangles of a ghost where none are asked for.
+pub const GHOST_FACES: usize = 2000;
+
+/// Meshes of more triangles than this have a ghost unless it is refused.
+const LARGE: usize = 20_000;
+
+/// Whether splines run on a ghost, and of how many triangles.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum GhostSize {
+    /// [`GHOST_FACES`] for meshes of more than 20 000 triangles in other spaces than `vertices`; none
+    /// where such a mesh cannot be collapsed.
+    #[default]
+    Auto,
+    /// None.
+    Off,
+    /// At most this many triangles.
+    Faces(usize),
+}
+
+/// How the mesh follows its ghost.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Lift {
+    /// Gradients carried to the triangles, then one sparse solve a frame.
+    #[default]
+    Solve,
+    /// Places carried to the vertices: no solve.
+    Direct,
+}
+
+/// What is asked of a ghost.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GhostOptions {
+    /// Its size.
+    pub size: GhostSize,
+    /// How the mesh follows.
+    pub lift: Lift,
+    /// Whether what is missing at the keys is kept; without it keys are met but for the detail that the
+    /// ghost cannot carry (X19's own).
+    pub residual: bool,
+}
+
+impl Default for GhostOptions {
+    fn default() -> Self {
+        GhostOptions {
+            size: GhostSize::Auto,
+            lift: Lift::Solve,
+            residual: true,
+        }
+    }
+}
+
+/// What is known about a ghost.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GhostReport {
+    /// Its triangles.
+    pub faces: usize,
+    /// Its vertices.
+    pub vertices: usize,
+    /// How the mesh follows.
+    pub lift: Lift,
+    /// Whether what is missing at the keys is kept.
+    pub residual: bool,
+    /// The collapses: triangles left and the cost of the collapse that led there (squared length times
+    /// area over the keys), at most 64 of them, evenly in the logarithm of the triangles.
+    pub curve: Vec<(usize, f64)>,
+}
+
+/// A coarser mesh under some keys.
+#[derive(Debug, Clone)]
+pub(super) struct Ghost {
+    pub(super) topology: Arc<Topology>,
+    /// The vertices of the mesh that are its vertices.
+    vertices: Vec<u32>,
+    absorber: Vec<u32>,
+    curve: Vec<(usize, f64)>,
+}
+
+impl Ghost {
+    /// The ghost for some keys, whose shapes are `poses`; none where none is wanted or needed.
+    pub(super) fn of(
+        keys: &Keys,
+        poses: &[Vec<f64>],
+        space: &str,
+        size: GhostSize,
+    ) -> Result<Warned<Option<Self>>> {
+        let triangles = keys.poses().topology().triangles();
+        let (faces, asked) = match size {
+            GhostSize::Off => return Ok(Warned::clean(None)),
+            GhostSize::Auto if triangles.len() <= LARGE || space == "vertices" => {
+                return Ok(Warned::clean(None));
+            }
+            GhostSize::Auto => (GHOST_FACES, false),
+            GhostSize::Faces(faces) => (faces, true),
+        };
+        if faces >= triangles.len() {
+            return Ok(Warned::clean(None));
+        }
+        let poses: Vec<&[f64]> = poses.iter().map(Vec::as_slice).collect();
+        match collapse(triangles, &poses, faces) {
+            Err(error) if asked => Err(refused(error, faces)),
+            Err(error) => Ok(Warned {
+                output: None,
+                warnings: vec![without(error)],
+            }),
+            Ok(found) => {
+                let topology = Topology::from_triangles(found.vertices.len(), &found.triangles);
+                let topology =
+                    topology.map_err(|error| Diagnostic::error(format!("the ghost: {error}")))?;
+                Ok(Warned::clean(Some(Ghost {
+                    topology: Arc::new(topology),
+                    vertices: found.vertices,
+                    absorber: found.absorber,
+                    curve: found.curve,
+                })))
+            }
+        }
+    }
+
+    /// The ghost's 3G positions in a shape of the mesh.
+    pub(super) fn pick(&self, positions: &[f64]) -> Vec<f64> {
+        let place = |&vertex: &u32| &positions[3 * vertex as usize..3 * vertex as usize + 3];
+        self.vertices.iter().flat_map(place).copied().collect()
+    }
+
+    /// What is known about it.
+    pub(super) fn report(&self, options: GhostOptions) -> GhostReport {
+        GhostReport {
+            faces: self.topology.triangles().len(),
+            vertices: self.vertices.len(),
+            lift: options.lift,
+            residual: options.residual,
+            curve: self.sampled_curve(),
+        }
+    }
+
+    /// The curve of costs at no more than 64 sizes, the last among them.
+    fn sampled_curve(&self) -> Vec<(usize, f64)> {
+        const POINTS: usize = 64;
+        let (Some(first), Some(last)) = (self.curve.first(), self.curve.last()) else {
+            return Vec::new();
+        };
+        let (from, to) = (libm::log(first.0 as f64), libm::log(last.0.max(1) as f64));
+        let mut sampled: Vec<(usize, f64)> = (0..POINTS)
+            .filter_map(|i| {
+                let faces = libm::exp(from + (to - from) * i as f64 / (POINTS - 1) as f64);
+                let at = self.curve.partition_point(|(left, _)| *left as f64 > faces);
+                self.curve.get(at).copied()
+            })
+            .chain([*last])
+            .collect();
+        sampled.dedup_by_key(|(faces, _)| *faces);
+        sampled
+    }
+}
+
+/// What is said where a ghost would have been made unasked.
+fn without(error: CollapseError) -> Diagnostic {
+    Diagnostic::warning(format!("no ghost mesh, frames take longer: {error}"))
+        .hint("`--ghost FACES` asks for another size, `--ghost off` for none")
+}
+
+fn refused(error: CollapseError, faces: usize) -> Box<Diagnostic> {
+    let told = |text: String| Diagnostic::error(text);
+    Box::new(match error {
+        CollapseError::Stuck { triangles } => told(format!(
+            "the mesh cannot be collapsed to {faces} faces: its surface holds at {triangles}"
+        ))
+        .hint(format!(
+            "`--ghost {triangles}` or more, or `--ghost off` (ghost: \"off\" in recipes)"
+        )),
+        CollapseError::EdgeOfMany { edge: [a, _] } => {
+            told(format!("no ghost of a mesh that is no manifold: {error}"))
+                .at_vertex(a as usize + 1)
+                .hint("`--ghost off` completes any mesh (ghost: \"off\" in recipes)")
+        }
+        CollapseError::Degenerate { triangle } => {
+            told(format!("no ghost of a mesh that is no manifold: {error}"))
+                .at_face(triangle + 1)
+                .hint("`--ghost off` completes any mesh (ghost: \"off\" in recipes)")
+        }
+    })
+}
+
+/// A mesh that follows its ghost.
+pub(super) struct Following {
+    turns: Turns,
+    way: Way,
+    /// Cardinal weights of the keys by time; none without a residual.
+    weights: Option<KeySpline>,
+    /// The mean vertex of the mesh by time.
+    mean: KeySpline,
+    parts: Parts,
+}
+
+/// How places are found.
+enum Way {
+    Solve(Gradients),
+    Direct(Direct),
+}
+
+impl Following {
+    /// Follows `ghost` through the keys' shapes `poses`; `weights` are the cardinal splines of the keys,
+    /// where the residual is wanted.
+    pub(super) fn new(
+        ghost: &Ghost,
+        topology: &Topology,
+        poses: &[Vec<f64>],
+        lift: Lift,
+        weights: Option<KeySpline>,
+        mean: KeySpline,
+    ) -> Result<Self> {
+        let ghosts: Vec<Vec<f64>> = poses.iter().map(|pose| ghost.pick(pose)).collect();
+        let turns = Turns::new(ghost.topology.triangles(), &ghosts[0]);
+        let walk = Walk::new(ghost.topology.triangles(), &ghosts[0]);
+        let keep = weights.is_some();
+        let way = match lift {
+            Lift::Solve => Way::Solve(Gradients::new(
+                topology,
+                poses,
+                &walk.to_faces(topology.triangles(), &poses[0], &ghost.absorber),
+                |key| turns.of(&ghosts[key]),
+                keep,
+            )?),
+            Lift::Direct => Way::Direct(Direct::new(
+                poses,
+                &ghosts,
+                walk.to_vertices(&poses[0], &ghost.absorber),
+                |key| turns.of(&ghosts[key]),
+                keep,
+            )),
+        };
+        let parts = Parts {
+            components: Components::new(topology.vertices(), topology.triangles()),
+            ghost: ghost.vertices.clone(),
+        };
+        Ok(Following {
+            turns,
+            way,
+            weights,
+            mean,
+            parts,
+        })
+    }
+
+    /// How many coordinates the ghost has.
+    pub(super) fn ghost_width(&self) -> usize {
+        3 * self.parts.ghost.len()
+    }
+
+    /// Writes the 3V positions of the mesh for the ghost's positions at time `t`.
+    pub(super) fn place(&self, t: f64, ghost: &[f64], positions: &mut [f64]) {
+        let turns = self.turns.of(ghost);
+        let mut weights = Vec::new();
+        if let Some(spline) = &self.weights {
+            weights.resize(spline.width(), 0.0);
+            spline.evaluate(t, &mut weights);
+        }
+        match &self.way {
+            Way::Solve(gradients) => {
+                gradients.integrate(&turns, &weights, positions);
+                self.parts.place(ghost, positions);
+            }
+            Way::Direct(direct) => direct.place(&turns, ghost, &weights, positions),
+        }
+        let mut mean = [0.0; 3];
+        self.mean.evaluate(t, &mut mean);
+        let off = nalgebra::Vector3::from(mean) - crate::mesh::rigid_align::mean(positions);
+        for (at, place) in positions.iter_mut().enumerate() {
+            *place += off[at % 3];
+        }
+    }
+}
+
+/// The connected parts of the mesh, each of which has vertices of the ghost.
+struct Parts {
+    components: Components,
+    ghost: Vec<u32>,
+}
+
+impl Parts {
+    /// Moves each part so that the mean of its ghost vertices is where the ghost has it.
+    fn place(&self, ghost: &[f64], positions: &mut [f64]) {
+        let part = self.components.part();
+        let mut sums = vec![[0.0; 4]; self.components.count()];
+        for (&vertex, place) in self.ghost.iter().zip(ghost.chunks_exact(3)) {
+            let at = 3 * vertex as usize;
+            let sum = &mut sums[part[vertex as usize] as usize];
+            for axis in 0..3 {
+                sum[axis] += place[axis] - positions[at + axis];
+            }
+            sum[3] += 1.0;
+        }
+        for (place, &part) in positions.chunks_exact_mut(3).zip(part) {
+            let sum = &sums[part as usize];
+            for axis in 0..3 {
+                place[axis] += sum[axis] / sum[3];
+            }
+        }
+    }
+}

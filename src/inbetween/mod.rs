@@ -1,0 +1,16 @@
+//! Key poses to motion: what lies between a few shapes of one mesh.
+//!
+//! [`complete`] runs splines through the keys' coordinates in a shape space (X19).
+
+pub mod complete;
+mod drift;
+pub mod ghost;
+pub mod keys;
+pub mod motion;
+
+pub use complete::{Boundary, CompleteOptions, Velocity, complete};
+pub use ghost::{GHOST_FACES, GhostOptions, GhostReport, GhostSize, Lift};
+pub use keys::{Keys, SPACING};
+pub use motion::{Motion, MotionFrames, MotionReport};
+
+pub use crate::math::key_spline::Handle;
