@@ -45,7 +45,8 @@ macro_rules! commands {
     ($($file:ident $name:ident,)*) => {
         #[derive(Debug, Subcommand)]
         enum Command {
-            $($name($file::Args),)*
+            // boxed: some take many arguments, and there is one of them a run
+            $($name(Box<$file::Args>),)*
         }
 
         impl Command {

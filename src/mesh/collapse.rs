@@ -476,7 +476,7 @@ impl Mesh {
             return false;
         };
         let [from, to] = [vertex, onto].map(|v| self.border[v as usize]);
-        if from && shared != 1 || from && !to {
+        if from && (shared != 1 || !to) {
             return false;
         }
         others.clear();
