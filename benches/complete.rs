@@ -19,8 +19,8 @@ use meshloom::task::Task;
 use rayon::prelude::*;
 
 fn main() -> ExitCode {
-    let numbers = std::env::args().filter_map(|argument| argument.parse::<usize>().ok());
-    let largest = numbers.last().unwrap_or(usize::MAX);
+    let mut numbers = std::env::args().filter_map(|argument| argument.parse::<usize>().ok());
+    let largest = numbers.next_back().unwrap_or(usize::MAX);
     let mut missed = 0;
     println!(
         "{:<16} {:>8} {:>9} {:>16} {:>17} {:>9} {:>16} {:>9} {:>7}",
