@@ -63,15 +63,9 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<Outcome> {
 }
 
 fn as_data(space: &SpaceReport, seconds: &Value) -> Value {
-    json!({
-        "space": space.name,
-        "dimension": space.dimension,
-        "modes": space.modes,
-        "numbers": space.numbers,
-        "left_out": { "psi": space.psi, "linear": space.linear, "cubic": space.cubic },
-        "large_turns": space.large_turns,
-        "seconds": seconds[space.name],
-    })
+    let mut data = space.data();
+    data["seconds"] = seconds[space.name].clone();
+    data
 }
 
 /// Errors between frames in each space, and which suits the capture.

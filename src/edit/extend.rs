@@ -162,6 +162,7 @@ fn unfinished() -> Box<Diagnostic> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::edit::Sketch;
     use crate::edit::{Edit, path, reverse};
     use crate::loom::test_looms::{ring, travelling};
 
@@ -189,7 +190,9 @@ mod tests {
         let round: Vec<Point> = (0..=12)
             .map(|i| [libm::cos(angle(i)), libm::sin(angle(i))])
             .collect();
-        let loom = path(&ring(10, 41, true), &round).unwrap().output;
+        let loom = path(&ring(10, 41, true), &round, Sketch::Through, None)
+            .unwrap()
+            .output;
         assert!(meets(loom.time()) && !meets(ring(10, 41, true).time()));
         let longer = extend(&loom, 100).unwrap().output;
         assert_eq!(longer.frames(), 141);

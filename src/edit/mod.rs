@@ -4,6 +4,7 @@
 //! Times and frames count from 1, as people count them; so do control points.
 
 mod add_loop;
+mod add_pose;
 mod bridge;
 mod exaggerate;
 mod extend;
@@ -26,12 +27,13 @@ use crate::math::b_spline::Point;
 use crate::signal::time::TimeError;
 
 pub use add_loop::{Looped, add_loop};
+pub use add_pose::add_pose;
 pub use exaggerate::exaggerate;
 pub use extend::extend;
 pub use hold::hold;
 pub use insert_control::insert_control;
 pub use move_control::move_control;
-pub use path::path;
+pub use path::{Sketch, path};
 pub use retime::retime;
 pub use reverse::reverse;
 pub use seam::Seam;
@@ -113,6 +115,10 @@ pub enum Edit {
     Path {
         /// Points of the map, in order.
         points: Vec<Point>,
+        /// What they are to the curve.
+        sketch: Sketch,
+        /// How many frames; none: as many as before.
+        frames: Option<usize>,
     },
     /// See [`exaggerate`].
     Exaggerate {
@@ -143,7 +149,11 @@ impl Edit {
             Edit::Speed { from, to, factor } => speed(loom, *from, *to, *factor),
             Edit::Retime { keys } => clean(retime(loom, keys)),
             Edit::Smooth { from, to, amount } => clean(smooth(loom, *from, *to, *amount)),
-            Edit::Path { points } => path(loom, points),
+            Edit::Path {
+                points,
+                sketch,
+                frames,
+            } => path(loom, points, *sketch, *frames),
             Edit::Exaggerate { amount } => clean(exaggerate(loom, *amount)),
         }
     }

@@ -169,7 +169,7 @@ pub fn each<T: Sync, U: Send>(
 }
 
 /// Numbers that no fit is possible for, whatever the reason given below.
-pub(super) fn unfit(error: impl std::fmt::Debug) -> Box<Diagnostic> {
+pub fn unfit(error: impl std::fmt::Debug) -> Box<Diagnostic> {
     Box::new(
         Diagnostic::error(format!("the signals cannot be fitted: {error:?}"))
             .hint("coordinates above 1e150 overflow when they are squared"),

@@ -9,6 +9,7 @@ pub mod frames;
 pub mod left_out;
 pub mod ordered;
 pub mod pins;
+pub mod pose_map;
 pub mod position_error;
 pub mod report;
 pub mod session;

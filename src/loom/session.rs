@@ -74,9 +74,11 @@ impl Session {
                 .err();
         }
         if time.places().len() != frames || !time.warps().is_empty() {
-            return Diagnostic::error("the time of this loom was edited: pins would undo that")
-                .hint("pin first, then edit the time")
-                .err();
+            return Diagnostic::error(
+                "this loom was edited since it was fitted: pins would undo that",
+            )
+            .hint("pin first, then edit the time or add poses")
+            .err();
         }
         let modes = loom.shape().modes();
         // ||Y||^2 = ||X||^2 + residual^2, of which the report has the ratio

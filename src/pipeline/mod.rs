@@ -16,6 +16,7 @@ mod open;
 mod output;
 mod picture;
 pub mod plot;
+mod poses;
 mod request;
 mod save;
 mod sheet;
@@ -44,5 +45,6 @@ pub use transfer::open_examples;
 pub use value::{Frames, Keyed, LoomValue, Picture, Shape, ShapeValue, Source, Value};
 pub use workbench::{Step, Workbench};
 
-pub use crate::edit::Edit;
+pub use crate::edit::transfer::Examples;
+pub use crate::edit::{Edit, Sketch};
 pub use crate::sample::Times;

@@ -44,6 +44,20 @@ pub struct SpaceReport {
     pub large_turns: usize,
 }
 
+impl SpaceReport {
+    /// Itself as the command line's JSON, without the time it took.
+    pub fn data(&self) -> serde_json::Value {
+        serde_json::json!({
+            "space": self.name,
+            "dimension": self.dimension,
+            "modes": self.modes,
+            "numbers": self.numbers,
+            "left_out": { "psi": self.psi, "linear": self.linear, "cubic": self.cubic },
+            "large_turns": self.large_turns,
+        })
+    }
+}
+
 /// Compares all spaces on a capture. Each is a phase of `task` by its name, so whoever observes it knows
 /// what each takes.
 ///

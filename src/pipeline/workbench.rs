@@ -78,13 +78,13 @@ impl Remembered for Opened {
     }
 }
 
-/// A fit and what should be known about it.
-struct Fit {
-    loom: Loom,
-    warnings: Vec<Diagnostic>,
+/// A loom that took work, and what should be known about it.
+pub(super) struct Found {
+    pub(super) loom: Loom,
+    pub(super) warnings: Vec<Diagnostic>,
 }
 
-impl Remembered for Fit {
+impl Remembered for Found {
     fn size(&self) -> usize {
         self.loom.size()
     }
@@ -100,7 +100,7 @@ impl Remembered for Fit {
         let (length, rest) = bytes.split_first_chunk::<8>()?;
         let length = usize::try_from(u64::from_le_bytes(*length)).ok()?;
         let (warnings, loom) = rest.split_at_checked(length)?;
-        Some(Fit {
+        Some(Found {
             loom: Loom::from_bytes(loom)?,
             warnings: serde_json::from_slice(warnings).ok()?,
         })
@@ -121,6 +121,11 @@ impl Workbench {
     /// The files.
     pub fn world(&self) -> &dyn World {
         &*self.world
+    }
+
+    /// What was made before.
+    pub(super) fn memory(&self) -> &Memory {
+        &self.memory
     }
 
     /// Cancellation and progress.
@@ -206,7 +211,7 @@ impl Workbench {
         let (fitted, made) = self.memory.remember(key, || {
             let mut warnings = Vec::new();
             let loom = fit(&frames.value, &options, &self.task)?.unpack(&mut warnings);
-            Ok(Fit { loom, warnings })
+            Ok(Found { loom, warnings })
         })?;
         self.note("fit", format!("{} frames", frames.value.frames()), made);
         let source = Source {
@@ -331,7 +336,7 @@ impl Workbench {
         )
     }
 
-    fn shape(&self, loom: &Loom, positions: Vec<f32>, key: Key) -> Result<ShapeValue> {
+    pub(super) fn shape(&self, loom: &Loom, positions: Vec<f32>, key: Key) -> Result<ShapeValue> {
         self.charge(4 * positions.len())?;
         Ok(Keyed::new(
             Shape {
@@ -512,7 +517,7 @@ impl Workbench {
         self.log.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn note(&self, name: &'static str, detail: impl Into<String>, made: Made) {
+    pub(super) fn note(&self, name: &'static str, detail: impl Into<String>, made: Made) {
         self.log().steps.push(Step {
             name,
             detail: detail.into(),
@@ -521,7 +526,7 @@ impl Workbench {
     }
 
     /// Counts what native results hold; scripts' own values have limits of their own.
-    fn charge(&self, bytes: usize) -> Result<()> {
+    pub(super) fn charge(&self, bytes: usize) -> Result<()> {
         let mut log = self.log();
         log.bytes = log.bytes.saturating_add(bytes);
         if log.bytes <= NATIVE_BYTES {

@@ -18,6 +18,7 @@
 
 mod anderson;
 mod guttman;
+mod one;
 
 use std::fmt;
 
@@ -29,6 +30,8 @@ use self::guttman::Guttman;
 use super::b_spline::Point;
 use super::symmetric;
 use crate::task::{Cancelled, Task};
+
+pub use one::place_one;
 
 /// All distances between n things: the upper half of a symmetric matrix with zero diagonal.
 #[derive(Debug, Clone, PartialEq)]

@@ -8,16 +8,18 @@ mod keys;
 mod output;
 mod params;
 mod pose;
+mod poses;
 mod shape;
 mod sources;
 mod time;
 
-use rhai::{Dynamic, Engine};
+use rhai::{Array, Dynamic, Engine};
 
 pub(super) use params::written_param;
 
+use super::context::Context;
 use crate::diag::{Diagnostic, Result};
-use crate::pipeline::{Frames, LoomValue, Picture, ShapeValue, Value};
+use crate::pipeline::{Examples, Frames, Keyed, LoomValue, Picture, ShapeValue, Value};
 use std::sync::Arc;
 
 /// Makes all functions and types known to `engine`.
@@ -26,14 +28,45 @@ pub(super) fn register(engine: &mut Engine) {
     engine.register_type_with_name::<LoomValue>("Loom");
     engine.register_type_with_name::<ShapeValue>("Shape");
     engine.register_type_with_name::<time::Clock>("Clock");
+    engine.register_type_with_name::<Keyed<Examples>>("Examples");
     engine.register_type_with_name::<Arc<Picture>>("Image");
     params::register(engine);
     sources::register(engine);
     time::register(engine);
     pose::register(engine);
+    poses::register(engine);
     shape::register(engine);
     keys::register(engine);
     output::register(engine);
+}
+
+/// The frames that a value stands for: a sequence, a loom, a mesh, an array of meshes.
+pub(super) fn frames_of(context: &Context, value: Dynamic) -> Result<Frames> {
+    if value.is_array() {
+        let meshes = value.into_array().unwrap_or_default();
+        return context.bench().sequence_of(&shapes(meshes)?);
+    }
+    match self::value(value)? {
+        Value::Sequence(frames) => Ok(frames),
+        Value::Loom(loom) => context.bench().frames_of(&loom),
+        Value::Shape(shape) => Ok(context.bench().single(&shape)),
+        other => Diagnostic::error(format!("frames are wanted, this is {}", other.kind())).err(),
+    }
+}
+
+/// The meshes of an array.
+pub(super) fn shapes(meshes: Array) -> Result<Vec<ShapeValue>> {
+    let shape = |(index, mesh): (usize, Dynamic)| match value(mesh)? {
+        Value::Shape(shape) => Ok(shape),
+        other => {
+            let (item, kind) = (index + 1, other.kind());
+            Diagnostic::error(format!(
+                "item {item} of the array is {kind}, a mesh is wanted"
+            ))
+            .err()
+        }
+    };
+    meshes.into_iter().enumerate().map(shape).collect()
 }
 
 /// The last value of a script as what the studio shows and `-o` saves.
@@ -57,6 +90,11 @@ pub(super) fn value(result: Dynamic) -> Result<Value> {
         Ok(picture) => return Ok(Value::Picture(picture)),
         Err(result) => result,
     };
+    if result.is::<Keyed<Examples>>() {
+        return Diagnostic::error("the recipe ends in examples without a loom")
+            .hint("`loom.transfer(examples(sources, targets))` takes them")
+            .err();
+    }
     if result.is::<time::Clock>() {
         return Diagnostic::error("the recipe ends in times without a loom")
             .hint("`loom.resample(fps(60))` takes them")

@@ -5,25 +5,16 @@ use std::sync::Arc;
 use rhai::Engine;
 use rhai::plugin::*;
 
+use super::frames_of;
 use super::sources::dynamic;
-use crate::diag::{Diagnostic, Result};
-use crate::pipeline::{Frames, LoomValue, Value};
+use crate::diag::Diagnostic;
+use crate::pipeline::{LoomValue, Value};
 use crate::script::arguments::{Raw, number};
 use crate::script::context::Context;
 use crate::script::diagnostics::{pass, raise};
 
 pub(super) fn register(engine: &mut Engine) {
     engine.register_global_module(exported_module!(functions).into());
-}
-
-/// The frames that a value stands for.
-fn frames(context: &Context, value: Dynamic) -> Result<Frames> {
-    match super::value(value)? {
-        Value::Sequence(frames) => Ok(frames),
-        Value::Loom(loom) => context.bench().frames_of(&loom),
-        Value::Shape(shape) => Ok(context.bench().single(&shape)),
-        other => Diagnostic::error(format!("frames are wanted, this is {}", other.kind())).err(),
-    }
 }
 
 #[export_module]
@@ -41,10 +32,7 @@ mod functions {
     #[rhai_fn(name = "compare", return_raw)]
     pub fn compare(call: NativeCallContext, a: Dynamic, b: Dynamic) -> Raw<Dynamic> {
         let context = Context::of(&call)?;
-        let (a, b) = (
-            pass(super::frames(&context, a))?,
-            pass(super::frames(&context, b))?,
-        );
+        let (a, b) = (pass(frames_of(&context, a))?, pass(frames_of(&context, b))?);
         Ok(dynamic(&pass(context.bench().compare(&a, &b))?))
     }
 
@@ -128,7 +116,7 @@ mod functions {
     #[rhai_fn(name = "sheet", return_raw)]
     pub fn sheet(call: NativeCallContext, value: Dynamic, path: &str) -> Raw<()> {
         let context = Context::of(&call)?;
-        let frames = pass(super::frames(&context, value))?;
+        let frames = pass(frames_of(&context, value))?;
         let picture = pass(context.bench().sheet(&frames, path))?;
         pass(context.save(Value::Picture(Arc::new(picture)), path))
     }

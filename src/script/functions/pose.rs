@@ -130,4 +130,25 @@ mod functions {
                 .pose(&loom, point(&at.into(), "the point")?),
         )
     }
+
+    /// How fast the vertices move at time t: psi'(t), without differences of frames.
+    ///
+    /// `loom.velocity(t)`
+    ///
+    /// A mesh whose coordinates are the velocities: per second where the loom knows its frame rate, else
+    /// per frame.
+    ///
+    /// ```rhai
+    /// let bar = fit(demo("bar"), #{ tolerance: 0.05 });
+    /// let still = compare(bar.velocity(2), bar.hold(2, 4).velocity(3.5));
+    /// check(still.max > 0, "while it is held it does not move");
+    /// ```
+    #[rhai_fn(name = "velocity", return_raw)]
+    pub fn velocity(call: NativeCallContext, loom: LoomValue, t: Dynamic) -> Raw<ShapeValue> {
+        pass(
+            Context::of(&call)?
+                .bench()
+                .velocity(&loom, number(&t, "t")?),
+        )
+    }
 }

@@ -16,7 +16,7 @@ pub(super) fn register(engine: &mut Engine) {
 }
 
 /// Opens files for a script: relative to the recipe, and only where it may read.
-fn open_pattern(context: &Context, pattern: &str) -> Result<Frames> {
+pub(super) fn open_pattern(context: &Context, pattern: &str) -> Result<Frames> {
     let path = context.readable(pattern)?;
     let opened = context.bench().open_frames(&InputSpec::new(path))?;
     Ok(context.warned(opened))
@@ -217,6 +217,24 @@ mod functions {
         let context = Context::of(&call)?;
         let fitted = pass(context.bench().fit(&frames, &request(options)?))?;
         Ok(context.warned(fitted))
+    }
+
+    /// How each shape space does on a capture: every second frame is fitted, the frames between measured.
+    ///
+    /// `spaces(sequence)`
+    ///
+    /// Gives a map: best, the name of the space that suits it; spaces, for each its space, dimension,
+    /// modes, stored numbers, left_out errors in vertex positions (psi, linear, cubic) and large_turns.
+    ///
+    /// ```rhai
+    /// let found = spaces(demo("bar").slice(1, 7));
+    /// check(found.spaces.len() == 5, "five spaces");
+    /// check(found.best != "vertices", "a bar that bends far is not for blending vertices");
+    /// ```
+    #[rhai_fn(name = "spaces", return_raw)]
+    pub fn spaces(call: NativeCallContext, frames: Frames) -> Raw<Dynamic> {
+        let context = Context::of(&call)?;
+        Ok(super::dynamic(&pass(context.bench().spaces(&frames))?))
     }
 }
 

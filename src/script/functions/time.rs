@@ -4,7 +4,7 @@ use rhai::plugin::*;
 use rhai::{Array, Engine, FnPtr, Map};
 
 use crate::diag::Diagnostic;
-use crate::pipeline::{Edit, Frames, LoomValue, Times};
+use crate::pipeline::{Edit, Frames, LoomValue, Sketch, Times};
 use crate::script::arguments::{Options, Raw, count, number, numbers, points};
 use crate::script::context::Context;
 use crate::script::diagnostics::{pass, raise};
@@ -50,6 +50,17 @@ fn sampled(call: &NativeCallContext, loom: &LoomValue, closure: &FnPtr) -> Raw<V
 
 fn keys(value: &Dynamic) -> Raw<Vec<[f64; 2]>> {
     points(value, "a key [out, in]")
+}
+
+fn sketch(curve: Option<&str>) -> Raw<Sketch> {
+    match curve {
+        None | Some("through") => Ok(Sketch::Through),
+        Some("controls") => Ok(Sketch::Controls),
+        Some(other) => raise(
+            Diagnostic::error(format!("no curve `{other}`"))
+                .hint("the points are passed (\"through\") or are its \"controls\""),
+        ),
+    }
 }
 
 #[export_module]
@@ -263,24 +274,38 @@ mod functions {
 
     /// A new motion: a curve sketched in the map of poses.
     ///
-    /// `loom.path([[x, y], ..])`
+    /// `loom.path([[x, y], ..])`, `loom.path([[x, y], ..], #{ frames, curve })`
     ///
-    /// The points are in layout units, in the order in which the motion passes them.
+    /// The points are in layout units. The motion passes them in order; with curve "controls" they are the
+    /// control points of a cubic B-spline with uniform knots (at least four), smooth however they lie.
+    /// frames is as many as before where it is not given. Root motion is dropped.
     ///
     /// ```rhai
     /// let bar = fit(demo("bar"), #{ tolerance: 0.05 });
     /// let sketch = bar.path([[0, 0], [0.1, 0], [0.2, 0.1], [0, 0.1]]);
-    /// check(sketch.frames > 1, "it moves");
+    /// check(sketch.frames == bar.frames, "it moves elsewhere");
+    /// let swing = [[0, 0], [0.1, 0], [0.2, 0.1], [0.1, 0], [0, 0]];
+    /// check(bar.path(swing, #{ frames: 60, curve: "controls" }).frames == 60, "as long as you like");
     /// ```
     #[rhai_fn(name = "path", return_raw)]
     pub fn path(call: NativeCallContext, loom: LoomValue, points: Array) -> Raw<LoomValue> {
-        edited(
-            &call,
-            &loom,
-            &Edit::Path {
-                points: super::points(&points.into(), "a point")?,
-            },
-        )
+        path_with(call, loom, points, Map::new())
+    }
+
+    #[rhai_fn(name = "path", return_raw)]
+    pub fn path_with(
+        call: NativeCallContext,
+        loom: LoomValue,
+        points: Array,
+        options: Map,
+    ) -> Raw<LoomValue> {
+        let options = Options::new(options, &["frames", "curve"])?;
+        let edit = Edit::Path {
+            points: super::points(&points.into(), "a point")?,
+            sketch: super::sketch(options.word("curve")?.as_deref())?,
+            frames: options.count("frames", 1)?,
+        };
+        edited(&call, &loom, &edit)
     }
 
     /// Frames of a loom at chosen times.
