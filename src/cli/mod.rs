@@ -23,6 +23,7 @@ mod doctor;
 mod fit;
 mod info;
 mod man;
+mod morph;
 mod open;
 mod plot;
 mod run;
@@ -65,6 +66,7 @@ commands! {
     sample Sample,
     transfer Transfer,
     complete Complete,
+    morph Morph,
     open Open,
     run Run,
     watch Watch,

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::print::Style;
-use crate::pipeline::Saved;
+use crate::pipeline::{Plan, Saved};
 
 /// A title and its rows, the values aligned.
 pub(super) fn table(style: Style, title: &str, rows: &[(&str, String)]) -> String {
@@ -71,6 +71,29 @@ pub(super) fn saved(style: Style, saved: &Saved) -> String {
         ));
     }
     table(style, &place, &rows)
+}
+
+/// Files in a row by the first, the last and their number.
+pub(super) fn files(files: &[PathBuf]) -> String {
+    match files {
+        [] => "nothing".to_string(),
+        [one] => one.display().to_string(),
+        [first, .., last] => format!(
+            "{} .. {} ({})",
+            first.display(),
+            last.display(),
+            files.len()
+        ),
+    }
+}
+
+/// What would be written and removed.
+pub(super) fn plan(style: Style, plan: &Plan) -> String {
+    let rows = [
+        ("writes", files(&plan.writes)),
+        ("removes", files(&plan.removals)),
+    ];
+    table(style, "plan", &rows)
 }
 
 /// Paths as data, as they are shown.

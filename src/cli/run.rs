@@ -175,24 +175,14 @@ fn checked(session: &Session, params: &[Param]) -> Outcome {
 
 /// What would be done, for people.
 fn planned(session: &Session, plan: &super::runs::RunPlan) -> String {
-    let files = |files: &[PathBuf]| match files {
-        [] => "nothing".to_string(),
-        [one] => one.display().to_string(),
-        [first, .., last] => format!(
-            "{} .. {} ({})",
-            first.display(),
-            last.display(),
-            files.len()
-        ),
-    };
-    let mut rows = vec![("reads", files(&plan.reads))];
+    let mut rows = vec![("reads", report::files(&plan.reads))];
     rows.extend(
         plan.steps
             .iter()
             .map(|step| (step.name, format!("{} ({})", step.detail, step.made))),
     );
-    rows.push(("writes", files(&plan.writes)));
-    rows.push(("removes", files(&plan.removals)));
+    rows.push(("writes", report::files(&plan.writes)));
+    rows.push(("removes", report::files(&plan.removals)));
     report::table(session.style, "plan", &rows)
 }
 

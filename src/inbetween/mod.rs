@@ -1,12 +1,15 @@
-//! Key poses to motion: what lies between a few shapes of one mesh.
+//! Key poses to motion: what lies between a few shapes of one mesh, or between skeletons.
 //!
-//! [`complete`] runs splines through the keys' coordinates in a shape space (X19).
+//! [`complete`] runs splines through the keys' coordinates in a shape space (X19); [`isometric`],
+//! [`polygon`] and [`skeleton`] keep lengths (IM).
 
 pub mod complete;
 mod drift;
 pub mod ghost;
+pub mod isometric;
 pub mod keys;
 pub mod motion;
+pub mod polygon;
 
 pub use complete::{Boundary, CompleteOptions, Velocity, complete};
 pub use ghost::{GHOST_FACES, GhostOptions, GhostReport, GhostSize, Lift};

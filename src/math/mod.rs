@@ -4,6 +4,7 @@ pub mod b_spline;
 pub mod banded;
 pub mod cubic_spline;
 pub mod curve_join;
+pub mod direction;
 pub mod growing_qr;
 pub mod key_spline;
 pub mod layout;

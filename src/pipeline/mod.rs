@@ -11,6 +11,7 @@ mod key_path;
 mod lanes;
 mod loom;
 mod memory;
+mod morph;
 mod numbering;
 mod open;
 mod output;
@@ -34,6 +35,10 @@ pub use key::{Key, KeyBuilder};
 pub use key_path::{KeyPath, key_map, key_path, plot_motion};
 pub use loom::{check_loom_output, is_loom, open_loom, save_loom};
 pub use memory::{Made, Memory, Remembered};
+pub use morph::{
+    AlignmentEffect, AlignmentReport, EdgeReport, Morph, MorphMethod, MorphReport, MorphRequest,
+    Strain, morph, morph_frames,
+};
 pub use open::{Capture, Content, Origin, open};
 pub use output::{Output, Plan, plan};
 pub use picture::{PictureFormat, save_picture};

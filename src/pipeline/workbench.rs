@@ -13,8 +13,8 @@ use super::memory::{Made, Memory, Remembered};
 use super::request::FitRequest;
 use super::value::{Frames, Keyed, LoomValue, Picture, Shape, ShapeValue, Source, content_key};
 use super::{
-    CompleteRequest, InputSpec, PictureFormat, complete, contact_sheet, files, open, open_loom,
-    plot,
+    CompleteRequest, InputSpec, MorphRequest, PictureFormat, complete, contact_sheet, files, morph,
+    morph_frames, open, open_loom, plot,
 };
 use crate::demo::Demo;
 use crate::diag::{Diagnostic, Result, Warned};
@@ -65,7 +65,8 @@ struct Log {
     bytes: usize,
 }
 
-/// What files held when they had the identities that are part of its key.
+/// Frames that took work: what files held when they had the identities that are part of its key, a
+/// morph.
 struct Opened {
     sequence: Sequence,
     key: Key,
@@ -426,6 +427,30 @@ impl Workbench {
         Ok(Warned {
             output: Keyed::new(completed.sequence.clone(), key),
             warnings: completed.warnings.clone(),
+        })
+    }
+
+    /// The frames between poses.
+    ///
+    /// # Errors
+    /// As [`morph`].
+    pub fn morph(&self, poses: &Frames, request: &MorphRequest) -> Result<Warned<Frames>> {
+        let frames = morph_frames(&poses.value, request)?;
+        self.charge(12 * poses.vertices() * frames)?;
+        let key = poses.then("morph").text(&format!("{request:?}")).finish();
+        let (found, made) = self.memory.remember(key, || {
+            let mut warnings = Vec::new();
+            let morph = morph(&poses.value, request, &self.task)?.unpack(&mut warnings);
+            Ok(Opened {
+                sequence: morph.frames,
+                key,
+                warnings,
+            })
+        })?;
+        self.note("morph", format!("{} poses", poses.frames()), made);
+        Ok(Warned {
+            output: Keyed::new(found.sequence.clone(), key),
+            warnings: found.warnings.clone(),
         })
     }
 

@@ -5,6 +5,7 @@
 #![allow(unreachable_pub)]
 
 mod keys;
+mod morph;
 mod output;
 mod params;
 mod pose;
@@ -37,6 +38,7 @@ pub(super) fn register(engine: &mut Engine) {
     poses::register(engine);
     shape::register(engine);
     keys::register(engine);
+    morph::register(engine);
     output::register(engine);
 }
 

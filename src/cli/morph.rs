@@ -1,0 +1,122 @@
+//! `meshloom morph POSE POSE.. -o OUT`: the frames between poses of a mesh.
+
+use std::path::PathBuf;
+
+use serde_json::json;
+
+use super::args::Part;
+use super::report;
+use super::session::{Outcome, Session};
+use crate::diag::Result;
+use crate::pipeline::{self, MorphMethod, MorphReport, MorphRequest, Output};
+
+/// Write the frames between poses of a mesh
+///
+/// Poses follow each other in the order given; the frames at them are the poses themselves. isometric:
+/// edge lengths go linearly from one pose to the next and triangles turn as their neighbours do; exact
+/// for meshes without inner vertices.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    /// Meshes with the same faces, in order: files, a folder, a pattern, or one file with many frames
+    #[arg(value_name = "POSE", required = true)]
+    poses: Vec<PathBuf>,
+
+    #[command(flatten)]
+    part: Part,
+
+    /// One file, or a folder or pattern (frame_####.obj) for a file a frame
+    #[arg(long, short, value_name = "OUT")]
+    output: PathBuf,
+
+    /// How shapes between the poses are found: isometric
+    #[arg(long, value_name = "METHOD", default_value = MorphMethod::default().name())]
+    method: MorphMethod,
+
+    /// This many frames, evenly over the whole, both ends among them [default: 24 from each pose to the
+    /// next]
+    #[arg(long, value_name = "N")]
+    frames: Option<usize>,
+
+    /// Say which files would be written and removed, and end
+    #[arg(long)]
+    plan: bool,
+}
+
+pub(super) fn run(args: &Args, session: &Session) -> Result<Outcome> {
+    let (world, task) = (session.world(), &session.task);
+    let capture = session.open(&args.part.of(&args.poses, None))?;
+    let output = Output::from(&args.output).protecting(&capture.origin.files);
+    let poses = capture.content.sequence(task)?;
+    let request = MorphRequest {
+        method: args.method,
+        frames: args.frames,
+    };
+    if args.plan {
+        let frames = pipeline::morph_frames(&poses, &request)?;
+        let plan = pipeline::plan(world, &output, frames)?;
+        return Ok(Outcome {
+            report: report::plan(session.style, &plan),
+            object: json!(plan),
+            ..Outcome::default()
+        });
+    }
+    let morph = session.keep(pipeline::morph(&poses, &request, task)?);
+    let saved = pipeline::save(world, &morph.frames, &output, task)?;
+    Ok(Outcome {
+        object: json!({
+            "outputs": report::paths(&saved.outputs),
+            "frames": saved.frames,
+            "report": morph.report,
+            "seconds": session.progress.seconds(&["load", "morph", "write"]),
+            "warnings": [],
+        }),
+        report: format!(
+            "{}{}",
+            report::saved(session.style, &saved),
+            told(session, &morph.report)
+        ),
+        ..Outcome::default()
+    })
+}
+
+/// The report for people.
+fn told(session: &Session, found: &MorphReport) -> String {
+    let pair = |mean: f64, worst: f64| {
+        format!(
+            "{} on average, {} at most",
+            report::percent(mean),
+            report::percent(worst)
+        )
+    };
+    let mut rows = vec![
+        (
+            "edge length error",
+            pair(found.edges.mean_percent, found.edges.worst_percent),
+        ),
+        (
+            "strain of the poses",
+            pair(found.strain.mean_percent, found.strain.worst_percent),
+        ),
+    ];
+    if let Some(alignment) = &found.alignment {
+        let degrees = |value: f64| format!("{} degrees", report::number(value));
+        rows.push(("rigid turn taken off", degrees(alignment.turn_degrees)));
+        rows.push((
+            "normals from slerp",
+            format!(
+                "{} on average, {} without that",
+                degrees(alignment.with.normal_mean_degrees),
+                degrees(alignment.without.normal_mean_degrees),
+            ),
+        ));
+        rows.push((
+            "edges half way",
+            format!(
+                "{} on average, {} without that",
+                report::percent(alignment.with.edge_mean_percent),
+                report::percent(alignment.without.edge_mean_percent),
+            ),
+        ));
+    }
+    report::table(session.style, found.method, &rows)
+}

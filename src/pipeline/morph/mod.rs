@@ -1,0 +1,258 @@
+//! Morphs: poses of one mesh to the frames between them, by any of the methods. To add a method: a file
+//! beside this one and a line in [`MorphMethod`].
+
+mod edges;
+mod isometric;
+
+use std::str::FromStr;
+
+use serde::Serialize;
+
+use crate::diag::{Diagnostic, Result, Warned};
+use crate::mesh::{FrameSource, Sequence};
+use crate::task::Task;
+
+pub use edges::{EdgeReport, Strain};
+
+/// How shapes between poses are found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum MorphMethod {
+    /// Lengths linear, triangles turned as their neighbours are: see [`crate::inbetween::isometric`].
+    #[default]
+    Isometric,
+}
+
+impl MorphMethod {
+    /// All of them.
+    pub const ALL: &[MorphMethod] = &[MorphMethod::Isometric];
+
+    /// Its name on the command line and in recipes.
+    pub fn name(self) -> &'static str {
+        match self {
+            MorphMethod::Isometric => "isometric",
+        }
+    }
+}
+
+impl FromStr for MorphMethod {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        let found = Self::ALL.iter().find(|method| method.name() == name);
+        found.copied().ok_or_else(|| {
+            let names: Vec<_> = Self::ALL.iter().map(|method| method.name()).collect();
+            format!("no method `{name}`; there are {}", names.join(", "))
+        })
+    }
+}
+
+/// What is asked of a morph.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct MorphRequest {
+    /// The method.
+    pub method: MorphMethod,
+    /// How many frames, both ends among them, at least 2; if not given, 24 from each pose to the
+    /// next.
+    pub frames: Option<usize>,
+}
+
+/// Frames from one pose to the next where their number is not given: a second of film.
+const BETWEEN: usize = 24;
+
+/// Frames of a morph and how good they are.
+#[derive(Debug, Clone)]
+pub struct Morph {
+    /// The frames; those at poses are the poses.
+    pub frames: Sequence,
+    /// What was measured.
+    pub report: MorphReport,
+}
+
+/// What was measured of a morph, as the command line's JSON has it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MorphReport {
+    /// The method's name.
+    pub method: &'static str,
+    /// How many poses there were.
+    pub poses: usize,
+    /// How far edges are from the straight path between their lengths.
+    pub edges: EdgeReport,
+    /// How far the poses are from isometric: the largest of each pair of neighbours.
+    pub strain: Strain,
+    /// What taking off the rigid motion changes; for the method `isometric`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub alignment: Option<AlignmentReport>,
+}
+
+/// What taking off the rigid motion between two poses before they are compared changes half way between
+/// them; of the pair of neighbours that turns most.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct AlignmentReport {
+    /// By how much the whole turns, in degrees.
+    pub turn_degrees: f64,
+    /// With the alignment.
+    pub with: AlignmentEffect,
+    /// Without.
+    pub without: AlignmentEffect,
+}
+
+/// Half way between two poses.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct AlignmentEffect {
+    /// Mean error of an edge length in percent.
+    pub edge_mean_percent: f64,
+    /// Largest error of an edge length in percent.
+    pub edge_worst_percent: f64,
+    /// Mean angle between a triangle's normal and the great circle between its normals in the poses.
+    pub normal_mean_degrees: f64,
+    /// The largest such angle.
+    pub normal_worst_degrees: f64,
+}
+
+/// Where in a morph a frame is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Moment {
+    /// The pose before it, from 0.
+    pose: usize,
+    /// How far to the next pose, in \[0, 1).
+    t: f64,
+}
+
+/// How many frames [`morph`] gives.
+///
+/// # Errors
+/// Fewer than two poses or frames.
+pub fn morph_frames(poses: &Sequence, request: &MorphRequest) -> Result<usize> {
+    let count = poses.frames();
+    if count < 2 {
+        return Diagnostic::error(format!("a morph needs two poses, here is {count}"))
+            .hint("name several meshes, or a folder or file that holds several frames")
+            .err();
+    }
+    match request.frames.unwrap_or(BETWEEN * (count - 1) + 1) {
+        frames @ 2.. => Ok(frames),
+        frames => Diagnostic::error(format!("a morph has at least 2 frames, asked are {frames}"))
+            .hint("two are the poses at both ends alone")
+            .err(),
+    }
+}
+
+/// Frames between poses. Poses follow each other in the order of the sequence, the same number of
+/// frames from each to the next.
+///
+/// # Errors
+/// As [`morph_frames`]; a mesh that the method does not suit, cancellation.
+pub fn morph(poses: &Sequence, request: &MorphRequest, task: &Task) -> Result<Warned<Morph>> {
+    let (count, frames) = (poses.frames(), morph_frames(poses, request)?);
+    let moments: Vec<Moment> = (0..frames)
+        .map(|frame| moment(frame, frames, count))
+        .collect();
+    let mut morph = match request.method {
+        MorphMethod::Isometric => isometric::morph(poses, &moments, task)?,
+    };
+    morph
+        .warnings
+        .extend(edges::strain_warning(&morph.output.report.strain));
+    Ok(morph)
+}
+
+/// Where frame `frame` of `frames` lies among `poses` poses, both from 0; exact at poses.
+fn moment(frame: usize, frames: usize, poses: usize) -> Moment {
+    let along = frame * (poses - 1);
+    let (pose, rest) = (along / (frames - 1), along % (frames - 1));
+    Moment {
+        pose,
+        t: rest as f64 / (frames - 1) as f64,
+    }
+}
+
+/// The 3V coordinates of a pose.
+fn doubles(poses: &Sequence, pose: usize) -> Vec<f64> {
+    poses.frame(pose).iter().map(|&x| f64::from(x)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::mesh::Topology;
+
+    /// A roof of two triangles, opened by `angle` at its ridge of length 2.
+    fn roofs(angles: &[f64]) -> Sequence {
+        let topology = Topology::from_triangles(4, &[[0, 1, 2], [1, 0, 3]]).unwrap();
+        let positions = angles.iter().flat_map(|&angle| {
+            let (sine, cosine) = libm::sincos(angle);
+            [
+                [0.0, 0.0, 0.0],
+                [2.0, 0.0, 0.0],
+                [1.0, cosine, sine],
+                [1.0, -cosine, sine],
+            ]
+            .into_iter()
+            .flatten()
+            .map(|x| x as f32)
+            .collect::<Vec<_>>()
+        });
+        Sequence::new(Arc::new(topology), positions.collect(), None)
+    }
+
+    #[test]
+    fn frames_at_poses_are_the_poses_and_others_keep_their_lengths() {
+        let poses = roofs(&[0.0, 0.8, -0.3]);
+        let request = MorphRequest {
+            frames: Some(9),
+            ..MorphRequest::default()
+        };
+        let found = morph(&poses, &request, &Task::default()).unwrap().output;
+        assert_eq!(found.frames.frames(), 9);
+        for (frame, pose) in [(0, 0), (4, 1), (8, 2)] {
+            assert_eq!(found.frames.frame(frame), poses.frame(pose));
+        }
+        // isometric poses up to their rounding to f32, and a polygon
+        assert!(
+            found.report.edges.worst_percent < 1e-4,
+            "{:?}",
+            found.report
+        );
+        assert!(found.report.strain.worst_percent < 1e-4);
+    }
+
+    #[test]
+    fn the_default_is_a_second_of_film_from_pose_to_pose() {
+        let found = morph(
+            &roofs(&[0.0, 0.5, 1.0]),
+            &MorphRequest::default(),
+            &Task::default(),
+        );
+        assert_eq!(found.unwrap().output.frames.frames(), 49);
+    }
+
+    #[test]
+    fn too_few_poses_or_frames_are_told() {
+        let one = morph(&roofs(&[0.0]), &MorphRequest::default(), &Task::default());
+        assert!(one.unwrap_err().message.contains("needs two poses"));
+        let request = MorphRequest {
+            frames: Some(1),
+            ..MorphRequest::default()
+        };
+        assert!(morph(&roofs(&[0.0, 1.0]), &request, &Task::default()).is_err());
+        assert_eq!("isometric".parse(), Ok(MorphMethod::Isometric));
+        assert!(
+            "x".parse::<MorphMethod>()
+                .unwrap_err()
+                .contains("isometric")
+        );
+    }
+
+    #[test]
+    fn poses_that_stretch_are_told_with_their_strain() {
+        let mut positions = roofs(&[0.2]).positions().to_vec();
+        positions.extend(roofs(&[0.2]).positions().iter().map(|x| 2.0 * x));
+        let poses = Sequence::new(roofs(&[0.0]).topology().clone(), positions, None);
+        let found = morph(&poses, &MorphRequest::default(), &Task::default()).unwrap();
+        // doubled: 1 against a mean of 1.5
+        assert!((found.output.report.strain.mean_percent - 100.0 / 1.5).abs() < 1e-3);
+        assert!(found.warnings[0].message.contains("not near-isometric"));
+    }
+}
