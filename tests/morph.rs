@@ -86,3 +86,96 @@ fn the_same_bytes_on_any_number_of_threads() {
     let read = |name: &str| fs::read(folder.path().join(name)).unwrap();
     assert!(read("1.pc2") == read("2.pc2"));
 }
+
+/// A hip, two legs and their ends, the right one bent by `turn` degrees about x.
+fn legs(turn: f64) -> String {
+    format!(
+        "HIERARCHY\nROOT hip\n{{\nOFFSET 0 0 0\nCHANNELS 6 Xposition Yposition Zposition Zrotation \
+         Xrotation Yrotation\nJOINT left\n{{\nOFFSET 0.2 0 0\nCHANNELS 3 Zrotation Xrotation Yrotation\n\
+         End Site\n{{\nOFFSET 0 -1 0\n}}\n}}\nJOINT right\n{{\nOFFSET -0.2 0 0\nCHANNELS 3 Zrotation \
+         Xrotation Yrotation\nEnd Site\n{{\nOFFSET 0 -1 0\n}}\n}}\n}}\nMOTION\nFrames: 1\nFrame Time: \
+         0.04\n0 1 0 0 0 0 0 0 0 0 {turn} 0\n"
+    )
+}
+
+#[test]
+fn skeletons_keep_the_lengths_of_their_bones() {
+    let folder = tempdir().unwrap();
+    for (name, turn) in [("a.bvh", 0.0), ("b.bvh", 80.0)] {
+        fs::write(folder.path().join(name), legs(turn)).unwrap();
+    }
+    for out in ["out.bvh", "out.json"] {
+        let args = format!("morph a.bvh b.bvh -o {out} --frames 11 --json");
+        let object = meshloom(folder.path(), &args).done().object();
+        assert_eq!(object["frames"], 11);
+        let worst = object["report"]["edges"]["worst_percent"].as_f64().unwrap();
+        // isometric poses: rounding of doubles
+        assert!(worst < 1e-12, "{worst}");
+        assert!(object["warnings"].as_array().unwrap().is_empty());
+    }
+    // what was written can be morphed on
+    let again = meshloom(
+        folder.path(),
+        "morph out.bvh out.json --range 6:12 -o c.json --json",
+    );
+    assert_eq!(again.done().object()["report"]["poses"], 7);
+    let text = fs::read_to_string(folder.path().join("out.bvh")).unwrap();
+    assert!(text.contains("Frames: 11") && text.contains("End Site"));
+}
+
+#[test]
+fn what_is_no_skeleton_is_named() {
+    let folder = tempdir().unwrap();
+    let put = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+    put("a.bvh", &legs(0.0));
+    put("cut.bvh", &legs(0.0)[..300]);
+    put(
+        "other.bvh",
+        &legs(0.0).replace("JOINT right", "JOINT wrong"),
+    );
+    put(
+        "cycle.json",
+        r#"{"joints": [{"name": "r", "parent": null, "position": [0, 0, 0]},
+           {"name": "a", "parent": "b", "position": [0, 1, 0]},
+           {"name": "b", "parent": "a", "position": [0, 2, 0]}]}"#,
+    );
+    put(
+        "roots.json",
+        r#"{"joints": [{"name": "a", "parent": null, "position": [0, 0, 0]},
+           {"name": "b", "parent": null, "position": [0, 1, 0]}]}"#,
+    );
+    sheet(3, 1).write_objs(&folder.path().join("mesh"));
+    let refused = |args: &str, parts: &[&str]| meshloom(folder.path(), args).fails_with(parts);
+    refused("morph a.bvh cut.bvh -o o.bvh", &["cut.bvh", "too early"]);
+    refused("morph a.bvh other.bvh -o o.bvh", &["other.bvh", "`right`"]);
+    refused(
+        "morph a.bvh cycle.json -o o.bvh",
+        &["cycle.json", "`a`", "itself"],
+    );
+    refused("morph a.bvh roots.json -o o.bvh", &["`a` and `b`"]);
+    refused("morph a.bvh mesh -o o.bvh", &["a mesh among skeletons"]);
+    refused("morph a.bvh a.bvh -o o.obj", &["o.obj", "skeleton"]);
+    refused("morph a.bvh a.bvh -o a.bvh", &["replace an input"]);
+    refused("morph a.bvh -o o.bvh", &["two poses"]);
+    assert!(!folder.path().join("o.bvh").exists());
+    // opposite bones: done, and told
+    let cross = |z: f64| {
+        let arms = [("e", 1, 0), ("w", -1, 0), ("n", 0, 1), ("s", 0, -1)];
+        let arms = arms.map(|(name, x, y)| {
+            format!(r#"{{"name": "{name}", "parent": "r", "position": [{x}, {y}, 0]}}"#)
+        });
+        format!(
+            r#"{{"joints": [{{"name": "r", "parent": null, "position": [0, 0, 0]}}, {},
+               {{"name": "up", "parent": "r", "position": [0, 0, {z}]}}]}}"#,
+            arms.join(", ")
+        )
+    };
+    put("up.json", &cross(0.3));
+    put("down.json", &cross(-0.3));
+    let over = meshloom(folder.path(), "morph up.json down.json -o o.bvh --json").done();
+    let warning = over.object()["warnings"][0]["message"].to_string();
+    assert!(
+        warning.contains("`up`") && warning.contains("opposite"),
+        "{warning}"
+    );
+}

@@ -1,4 +1,4 @@
-//! `meshloom morph POSE POSE.. -o OUT`: the frames between poses of a mesh.
+//! `meshloom morph POSE POSE.. -o OUT`: the frames between poses of a mesh or a skeleton.
 
 use std::path::PathBuf;
 
@@ -8,23 +8,25 @@ use super::args::Part;
 use super::report;
 use super::session::{Outcome, Session};
 use crate::diag::Result;
-use crate::pipeline::{self, MorphMethod, MorphReport, MorphRequest, Output};
+use crate::pipeline::{self, MorphMethod, MorphReport, MorphRequest, Output, Saved};
 
-/// Write the frames between poses of a mesh
+/// Write the frames between poses of a mesh or a skeleton
 ///
 /// Poses follow each other in the order given; the frames at them are the poses themselves. isometric:
 /// edge lengths go linearly from one pose to the next and triangles turn as their neighbours do; exact
-/// for meshes without inner vertices.
+/// for meshes without inner vertices. Of skeletons (.bvh, and .json lists of joints) bones go linearly
+/// in length and straight in direction.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// Meshes with the same faces, in order: files, a folder, a pattern, or one file with many frames
+    /// Meshes with the same faces, in order: files, a folder, a pattern, or one file with many frames; or
+    /// files of skeletons (.bvh, .json)
     #[arg(value_name = "POSE", required = true)]
     poses: Vec<PathBuf>,
 
     #[command(flatten)]
     part: Part,
 
-    /// One file, or a folder or pattern (frame_####.obj) for a file a frame
+    /// One file, or a folder or pattern (frame_####.obj) for a file a frame; a .bvh or .json for skeletons
     #[arg(long, short, value_name = "OUT")]
     output: PathBuf,
 
@@ -43,14 +45,14 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args, session: &Session) -> Result<Outcome> {
+    if args.poses.iter().any(|pose| pipeline::is_skeleton(pose)) {
+        return skeletons(args, session);
+    }
     let (world, task) = (session.world(), &session.task);
     let capture = session.open(&args.part.of(&args.poses, None))?;
     let output = Output::from(&args.output).protecting(&capture.origin.files);
     let poses = capture.content.sequence(task)?;
-    let request = MorphRequest {
-        method: args.method,
-        frames: args.frames,
-    };
+    let request = args.request();
     if args.plan {
         let frames = pipeline::morph_frames(&poses, &request)?;
         let plan = pipeline::plan(world, &output, frames)?;
@@ -62,21 +64,52 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<Outcome> {
     }
     let morph = session.keep(pipeline::morph(&poses, &request, task)?);
     let saved = pipeline::save(world, &morph.frames, &output, task)?;
-    Ok(Outcome {
+    Ok(done(session, &saved, &morph.report))
+}
+
+/// The same for skeletons.
+fn skeletons(args: &Args, session: &Session) -> Result<Outcome> {
+    let (world, task) = (session.world(), &session.task);
+    let poses = pipeline::open_skeletons(world, &args.poses, args.part.range, task)?;
+    let output = Output::from(&args.output).protecting(&args.poses);
+    if args.plan {
+        let writes = pipeline::plan_skeletons(world, &output)?;
+        return Ok(Outcome {
+            report: report::table(session.style, "plan", &[("writes", report::files(&writes))]),
+            object: json!({ "writes": report::paths(&writes), "removals": [] }),
+            ..Outcome::default()
+        });
+    }
+    let morph = session.keep(pipeline::morph_skeletons(&poses, &args.request(), task)?);
+    let saved = pipeline::save_skeletons(world, &morph.frames, &output, task)?;
+    Ok(done(session, &saved, &morph.report))
+}
+
+impl Args {
+    fn request(&self) -> MorphRequest {
+        MorphRequest {
+            method: self.method,
+            frames: self.frames,
+        }
+    }
+}
+
+fn done(session: &Session, saved: &Saved, found: &MorphReport) -> Outcome {
+    Outcome {
         object: json!({
             "outputs": report::paths(&saved.outputs),
             "frames": saved.frames,
-            "report": morph.report,
+            "report": found,
             "seconds": session.progress.seconds(&["load", "morph", "write"]),
             "warnings": [],
         }),
         report: format!(
             "{}{}",
-            report::saved(session.style, &saved),
-            told(session, &morph.report)
+            report::saved(session.style, saved),
+            told(session, found)
         ),
         ..Outcome::default()
-    })
+    }
 }
 
 /// The report for people.

@@ -12,6 +12,7 @@ pub mod obj;
 pub mod pc2;
 pub mod ply;
 mod rate;
+pub mod skeleton;
 
 use std::sync::Arc;
 

@@ -10,6 +10,7 @@ pub mod isometric;
 pub mod keys;
 pub mod motion;
 pub mod polygon;
+pub mod skeleton;
 
 pub use complete::{Boundary, CompleteOptions, Velocity, complete};
 pub use ghost::{GHOST_FACES, GhostOptions, GhostReport, GhostSize, Lift};

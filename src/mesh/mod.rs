@@ -15,6 +15,7 @@ mod patches;
 mod poisson;
 pub mod rigid_align;
 mod sequence;
+mod skeleton;
 mod subdivide;
 mod topology;
 
@@ -29,5 +30,6 @@ pub use normals::{unit_vector, vertex_normals};
 pub use patches::grow_patches;
 pub use poisson::{Poisson, PoissonAnalysis, reference_triangles};
 pub use sequence::{FrameSource, Sequence};
+pub use skeleton::{Joint, Mismatch, Skeleton, SkeletonError, SkeletonPoses};
 pub use subdivide::subdivide;
 pub use topology::{Attributes, Group, GroupKind, Topology, TopologyError};

@@ -37,7 +37,8 @@ pub use loom::{check_loom_output, is_loom, open_loom, save_loom};
 pub use memory::{Made, Memory, Remembered};
 pub use morph::{
     AlignmentEffect, AlignmentReport, EdgeReport, Morph, MorphMethod, MorphReport, MorphRequest,
-    Strain, morph, morph_frames,
+    SkeletonMorphed, Strain, is_skeleton, morph, morph_frames, morph_skeletons, open_skeletons,
+    plan_skeletons, save_skeletons,
 };
 pub use open::{Capture, Content, Origin, open};
 pub use output::{Output, Plan, plan};

@@ -3,7 +3,6 @@
 use serde::Serialize;
 
 use crate::diag::Diagnostic;
-use crate::mesh::Edges;
 
 /// Errors of edge lengths over the frames of a morph, against the straight path between their lengths
 /// in the poses.
@@ -44,9 +43,9 @@ pub(super) struct FrameErrors {
 impl FrameErrors {
     /// Compares the edges of `positions` with the lengths `wanted`. An edge that should have no length
     /// is left out.
-    pub(super) fn of(edges: &Edges, wanted: impl Fn(usize) -> f64, positions: &[f64]) -> Self {
+    pub(super) fn of(edges: &[[u32; 2]], wanted: impl Fn(usize) -> f64, positions: &[f64]) -> Self {
         let mut errors = FrameErrors::default();
-        for (edge, &ends) in edges.ends().iter().enumerate() {
+        for (edge, &ends) in edges.iter().enumerate() {
             let wanted = wanted(edge);
             let miss = (length(positions, ends) - wanted).abs();
             if wanted > 0.0 {
@@ -138,8 +137,8 @@ pub(super) fn strain_warning(strain: &Strain) -> Option<Diagnostic> {
 }
 
 /// The length of every edge of a pose.
-pub(super) fn lengths(edges: &Edges, positions: &[f64]) -> Vec<f64> {
-    let ends = edges.ends().iter();
+pub(super) fn lengths(edges: &[[u32; 2]], positions: &[f64]) -> Vec<f64> {
+    let ends = edges.iter();
     ends.map(|&ends| length(positions, ends)).collect()
 }
 

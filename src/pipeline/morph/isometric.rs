@@ -14,7 +14,7 @@ use crate::task::Task;
 
 /// Two neighbouring poses.
 struct Pair<'a> {
-    edges: &'a Edges,
+    edges: &'a [[u32; 2]],
     poses: [Vec<f64>; 2],
     lengths: [Vec<f64>; 2],
     morph: Isometric,
@@ -42,7 +42,7 @@ pub(super) fn morph(poses: &Sequence, moments: &[Moment], task: &Task) -> Result
             }
             continue;
         }
-        let pair = Pair::new(&edges, &connectivity, poses, first)?;
+        let pair = Pair::new(edges.ends(), &connectivity, poses, first)?;
         warnings.extend(pair.opposite_warning(first));
         strain = strain.join(Strain::between(&pair.lengths[0], &pair.lengths[1]));
         let report = pair.alignment(&connectivity, poses)?;
@@ -80,7 +80,7 @@ pub(super) fn morph(poses: &Sequence, moments: &[Moment], task: &Task) -> Result
 impl<'a> Pair<'a> {
     /// Poses `first` and the next.
     fn new(
-        edges: &'a Edges,
+        edges: &'a [[u32; 2]],
         connectivity: &Connectivity,
         poses: &Sequence,
         first: usize,

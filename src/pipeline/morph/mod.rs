@@ -3,6 +3,7 @@
 
 mod edges;
 mod isometric;
+mod skeleton;
 
 use std::str::FromStr;
 
@@ -13,6 +14,9 @@ use crate::mesh::{FrameSource, Sequence};
 use crate::task::Task;
 
 pub use edges::{EdgeReport, Strain};
+pub use skeleton::{
+    SkeletonMorphed, is_skeleton, morph_skeletons, open_skeletons, plan_skeletons, save_skeletons,
+};
 
 /// How shapes between poses are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -123,7 +127,10 @@ struct Moment {
 /// # Errors
 /// Fewer than two poses or frames.
 pub fn morph_frames(poses: &Sequence, request: &MorphRequest) -> Result<usize> {
-    let count = poses.frames();
+    wanted_frames(poses.frames(), request)
+}
+
+fn wanted_frames(count: usize, request: &MorphRequest) -> Result<usize> {
     if count < 2 {
         return Diagnostic::error(format!("a morph needs two poses, here is {count}"))
             .hint("name several meshes, or a folder or file that holds several frames")
@@ -144,9 +151,7 @@ pub fn morph_frames(poses: &Sequence, request: &MorphRequest) -> Result<usize> {
 /// As [`morph_frames`]; a mesh that the method does not suit, cancellation.
 pub fn morph(poses: &Sequence, request: &MorphRequest, task: &Task) -> Result<Warned<Morph>> {
     let (count, frames) = (poses.frames(), morph_frames(poses, request)?);
-    let moments: Vec<Moment> = (0..frames)
-        .map(|frame| moment(frame, frames, count))
-        .collect();
+    let moments = moments(frames, count);
     let mut morph = match request.method {
         MorphMethod::Isometric => isometric::morph(poses, &moments, task)?,
     };
@@ -156,14 +161,15 @@ pub fn morph(poses: &Sequence, request: &MorphRequest, task: &Task) -> Result<Wa
     Ok(morph)
 }
 
-/// Where frame `frame` of `frames` lies among `poses` poses, both from 0; exact at poses.
-fn moment(frame: usize, frames: usize, poses: usize) -> Moment {
-    let along = frame * (poses - 1);
-    let (pose, rest) = (along / (frames - 1), along % (frames - 1));
-    Moment {
-        pose,
-        t: rest as f64 / (frames - 1) as f64,
-    }
+/// Where `frames` frames lie among `poses` poses, at least two of both; exact at poses.
+fn moments(frames: usize, poses: usize) -> Vec<Moment> {
+    let last = frames - 1;
+    let along = (0..frames).map(|frame| frame * (poses - 1));
+    let moment = |along: usize| Moment {
+        pose: along / last,
+        t: (along % last) as f64 / last as f64,
+    };
+    along.map(moment).collect()
 }
 
 /// The 3V coordinates of a pose.
