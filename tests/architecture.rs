@@ -22,7 +22,7 @@ const MAP: &[(&str, &str)] = &[
     ("edit", "diag task math mesh space signal loom"),
     ("sample", "diag task mesh loom"),
     ("demo", "math mesh"),
-    ("format", "diag mesh loom"),
+    ("format", "diag math mesh loom"),
     ("plot", "image math mesh"),
     ("view", "image math mesh"),
     (
