@@ -91,8 +91,9 @@ fn pictures() -> Facts {
         return vec![("graphics", Value::Null), ("because", json!(reason))];
     }
     let given = |name| std::env::var(name).is_ok_and(|value| !value.is_empty());
-    let answers = tui::ask();
-    let choice = tui::choose(None, &answers, given("TMUX"), !given("NO_COLOR"));
+    let tmux = given("TMUX");
+    let answers = tui::ask(tmux);
+    let choice = tui::choose(None, &answers, tmux, !given("NO_COLOR"));
     let cell = answers
         .cell
         .map(|(width, height)| format!("{width} x {height} pixels"));
@@ -100,8 +101,15 @@ fn pictures() -> Facts {
         .background
         .map(|[r, g, b]| format!("#{r:02x}{g:02x}{b:02x}"));
     vec![
-        ("asked", json!(tui::QUERY.escape_default().to_string())),
+        (
+            "asked",
+            json!(tui::query(tmux).escape_default().to_string()),
+        ),
         ("answered", json!(answers.bytes.escape_ascii().to_string())),
+        ("terminal", json!(answers.name)),
+        ("kitty", json!(answers.kitty)),
+        ("sixel", json!(answers.sixel)),
+        ("sixel_colours", json!(answers.registers)),
         ("background", json!(background)),
         ("cell", json!(cell)),
         ("graphics", json!(choice.protocol.name())),

@@ -30,7 +30,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "RATE", value_parser = positive)]
     fps: Option<f64>,
 
-    /// How pictures are shown: kitty, blocks, braille, ascii [default: as the terminal says it can]
+    /// How pictures are shown: kitty, iterm2, sixel, blocks, braille, ascii [default: as the terminal says it can]
     #[arg(long, value_name = "HOW", value_parser = protocol)]
     graphics: Option<Protocol>,
 }

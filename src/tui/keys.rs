@@ -135,7 +135,7 @@ pub(super) fn named(key: KeyEvent) -> Option<String> {
     Some(format!("{prefix}{name}"))
 }
 
-/// Tells keys from what a slow terminal still answers, which arrives as keys: ESC ] or ESC _ up to ESC \
+/// Tells keys from what a slow terminal still answers, which arrives as keys: ESC ], ESC _ or ESC P up to ESC \
 /// or BEL.
 #[derive(Debug, Default)]
 pub(super) struct LateAnswer {
@@ -152,7 +152,7 @@ impl LateAnswer {
         let escaped = key.modifiers.contains(KeyModifiers::ALT);
         let bell = key.code == KeyCode::Char('g') && key.modifiers == KeyModifiers::CONTROL;
         match (self.taken, key.code) {
-            (None, KeyCode::Char(']' | '_')) if escaped => self.taken = Some(1),
+            (None, KeyCode::Char(']' | '_' | 'P')) if escaped => self.taken = Some(1),
             (None, _) => return false,
             (Some(_), KeyCode::Char('\\')) if escaped => self.taken = None,
             (Some(_), _) if bell => self.taken = None,

@@ -20,8 +20,9 @@ mod studio;
 mod terminal;
 mod theme;
 mod update;
+mod wire;
 mod work;
 
-pub use graphics::{Answers, Choice, Protocol, QUERY, choose, read_answers};
+pub use graphics::{Answers, Choice, Protocol, choose, query, read_answers};
 pub use studio::{Files, Opened, Options, run};
 pub use terminal::{ask, restore};

@@ -6,20 +6,20 @@ use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
 
-use ratatui::backend::{Backend, CrosstermBackend};
 use ratatui::buffer::Buffer;
 use ratatui::crossterm::event::{self as keyboard, KeyEventKind};
 use ratatui::crossterm::terminal::size;
 use ratatui::layout::Rect;
 
 use super::event::{Answer, Command, Event};
-use super::graphics::{Aside, Painter, Protocol, cell_size, choose, painter};
+use super::graphics::{Aside, Painter, Protocol, choose, painter};
 use super::keys::LateAnswer;
 use super::screen;
 use super::state::{Content, Same, Scene, Signals, Span, State};
 use super::terminal;
 use super::theme::{Depth, Look};
 use super::update::update;
+use super::wire::write_cells;
 use super::work::{Brush, Mailbox, Wish, start, start_painter};
 use crate::diag::{Diagnostic, Result, Warned};
 use crate::loom::Loom;
@@ -100,14 +100,13 @@ pub fn run(options: &Options, files: Arc<dyn Files>, task: &Task) -> Result<()> 
         (true, true) => Depth::True,
     };
     terminal::take().map_err(lost)?;
-    let answers = terminal::ask();
+    let answers = terminal::ask(options.tmux);
     let choice = choose(options.graphics, &answers, options.tmux, options.colour);
     let dark = answers.background.is_none_or(is_dark);
     let look = Look { dark, depth };
-    let cell = cell_size(choice.protocol, &answers);
-    let state = State::new(options.name.clone(), screen, cell, look);
+    let state = State::new(options.name.clone(), screen, choice.cell, look);
     let (send, receive) = mpsc::channel();
-    let mut studio = Studio::new(state, painter(choice.protocol, look), files, send);
+    let mut studio = Studio::new(state, painter(&choice, look), files, send);
     let ended = studio.run(&receive, task);
     studio.cancel.cancel();
     studio.forget();
@@ -236,16 +235,13 @@ impl Studio {
             bytes.extend_from_slice(b"\x1b[0m\x1b[2J");
         }
         screen::draw(&self.state, &mut *self.painter, &mut next, &mut aside);
-        self.painter.finish(&mut aside);
+        self.painter.finish(&mut next, &mut aside);
         let changes = self.shown.diff(&next);
         if changes.is_empty() && !self.stale && aside == Aside::default() {
             return Ok(());
         }
         bytes.extend(aside.before);
-        CrosstermBackend::new(&mut bytes)
-            .draw(changes.into_iter())
-            .map_err(lost)?;
-        bytes.extend(aside.after);
+        bytes.extend(write_cells(&changes));
         (self.shown, self.stale) = (next, false);
         terminal::send(&bytes).map_err(lost)
     }

@@ -84,15 +84,16 @@ pub(super) fn send(bytes: &[u8]) -> io::Result<()> {
     out.flush()
 }
 
-/// Asks the terminal what it can show. One that says nothing, or not enough, is waited for 200 ms.
-pub fn ask() -> Answers {
+/// Asks the terminal what it can show, if need be through tmux. One that says nothing, or not enough, is
+/// waited for 200 ms.
+pub fn ask(tmux: bool) -> Answers {
     // A terminal that cannot be asked has said nothing.
-    read_answers(&exchange().unwrap_or_default())
+    read_answers(&exchange(tmux).unwrap_or_default())
 }
 
 /// The bytes that came back.
 #[cfg(unix)]
-fn exchange() -> io::Result<Vec<u8>> {
+fn exchange(tmux: bool) -> io::Result<Vec<u8>> {
     use rustix::termios::{OptionalActions, SpecialCodeIndex, tcgetattr, tcsetattr};
     let keyboard = io::stdin();
     let before = tcgetattr(&keyboard)?;
@@ -102,19 +103,19 @@ fn exchange() -> io::Result<Vec<u8>> {
     waiting.special_codes[SpecialCodeIndex::VMIN] = 0;
     waiting.special_codes[SpecialCodeIndex::VTIME] = 1;
     tcsetattr(&keyboard, OptionalActions::Now, &waiting)?;
-    let bytes = collect();
+    let bytes = collect(tmux);
     tcsetattr(&keyboard, OptionalActions::Now, &before)?;
     bytes
 }
 
 #[cfg(unix)]
-fn collect() -> io::Result<Vec<u8>> {
+fn collect(tmux: bool) -> io::Result<Vec<u8>> {
     let mut out = io::stdout();
-    out.write_all(super::graphics::QUERY.as_bytes())?;
+    out.write_all(super::graphics::query(tmux).as_bytes())?;
     out.flush()?;
     let (start, mut bytes) = (Instant::now(), Vec::new());
     let mut part = [0; 256];
-    while start.elapsed() < PATIENCE && !super::graphics::complete(&bytes) {
+    while start.elapsed() < PATIENCE && !super::graphics::complete(&bytes, tmux) {
         let length = rustix::io::read(io::stdin(), &mut part)?;
         bytes.extend_from_slice(&part[..length]);
     }
@@ -123,6 +124,6 @@ fn collect() -> io::Result<Vec<u8>> {
 
 /// Other systems' terminals are not asked.
 #[cfg(not(unix))]
-fn exchange() -> io::Result<Vec<u8>> {
+fn exchange(_: bool) -> io::Result<Vec<u8>> {
     Ok(Vec::new())
 }

@@ -19,8 +19,6 @@ use crate::plot::{
 };
 use crate::view::{Camera, Renderer, Style, Surface, Wire};
 
-/// Plots without letters are drawn so many times as fine as they are shown.
-const COARSE: usize = 2;
 /// Opacity of the frames before and after.
 const SKIN: f32 = 0.22;
 /// How far away they are, in frames.
@@ -34,6 +32,8 @@ pub(super) struct Wish {
     pub(super) size: (usize, usize),
     /// Size of letters in pixels; 0: none.
     pub(super) text: f32,
+    /// Plots are drawn so many times as fine as they are shown.
+    pub(super) fine: usize,
     pub(super) look: Look,
 }
 
@@ -83,8 +83,7 @@ impl Brush {
     /// The picture of a wish.
     pub(super) fn paint(&mut self, wish: &Wish) -> Picture {
         let theme = wish.look.plot(wish.text);
-        // Without letters there are few pixels: lines half a pixel thick show more of them.
-        let fine = if wish.text > 0.0 { 1 } else { COARSE };
+        let fine = wish.fine;
         let (width, height) = ((fine * wish.size.0) as f32, (fine * wish.size.1) as f32);
         match &wish.subject {
             Subject::Map {
@@ -94,14 +93,14 @@ impl Brush {
             } => {
                 let mut map = signals.0.map.clone();
                 (map.window, map.span) = (*window, *span);
-                if fine > 1 {
+                if wish.text == 0.0 {
                     map.frames.clear();
                     map.reached.clear();
                 }
                 let (scene, plane) = pose_space(&map, width, height, &theme);
                 picture(&scene, vec![plane], fine)
             }
-            Subject::Times(signals) if fine > 1 => {
+            Subject::Times(signals) if wish.text == 0.0 => {
                 let (scene, planes) = chart(&coarse(&signals.0.times), width, height, &theme);
                 picture(&scene, planes, fine)
             }
@@ -186,10 +185,8 @@ impl Brush {
 
 /// A scene drawn finer than it is shown, and its planes in pixels that are shown.
 fn picture(scene: &plot::Scene, planes: Vec<Plane>, fine: usize) -> Picture {
-    let mut image = raster(scene, 1.0);
-    for _ in 1..fine {
-        image = image.halved();
-    }
+    let image = raster(scene, 1.0);
+    let image = if fine == 2 { image.halved() } else { image };
     let scale = 1.0 / fine as f32;
     let planes = planes.into_iter().map(|plane| scaled(plane, scale));
     Picture {

@@ -6,14 +6,18 @@
 mod blocks;
 mod choice;
 mod dots;
+mod inline;
+mod iterm2;
 mod kitty;
 mod palette;
+mod placeholder;
+mod sixel;
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-pub use choice::{Answers, Choice, QUERY, choose, read_answers};
-pub(super) use choice::{cell_size, complete};
+pub(super) use choice::complete;
+pub use choice::{Answers, Choice, choose, query, read_answers};
 
 use super::theme::Look;
 use crate::image::Image;
@@ -21,9 +25,13 @@ use crate::image::Image;
 /// How pictures are shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Protocol {
-    /// Kitty's: pixels.
+    /// Kitty's: pixels below the text.
     Kitty,
-    /// Half blocks: two colours a cell.
+    /// iTerm2's inline images: pixels.
+    Iterm2,
+    /// Sixel: pixels, as DEC's terminals had them.
+    Sixel,
+    /// Halves and quarters of cells: two colours a cell.
     Blocks,
     /// Braille: eight dots a cell.
     Braille,
@@ -33,8 +41,10 @@ pub enum Protocol {
 
 impl Protocol {
     /// All of them.
-    pub const ALL: [Protocol; 4] = [
+    pub const ALL: [Protocol; 6] = [
         Protocol::Kitty,
+        Protocol::Iterm2,
+        Protocol::Sixel,
         Protocol::Blocks,
         Protocol::Braille,
         Protocol::Ascii,
@@ -44,6 +54,8 @@ impl Protocol {
     pub fn name(self) -> &'static str {
         match self {
             Protocol::Kitty => "kitty",
+            Protocol::Iterm2 => "iterm2",
+            Protocol::Sixel => "sixel",
             Protocol::Blocks => "blocks",
             Protocol::Braille => "braille",
             Protocol::Ascii => "ascii",
@@ -54,10 +66,8 @@ impl Protocol {
 /// Bytes that go with a frame besides its cells.
 #[derive(Debug, Default, Clone, PartialEq, Eq)]
 pub(super) struct Aside {
-    /// To be sent before the cells: transmissions that cells refer to.
+    /// To be sent before the cells.
     pub(super) before: Vec<u8>,
-    /// To be sent after the cells: pictures that are put on top of them.
-    pub(super) after: Vec<u8>,
 }
 
 /// How many pixels a cell has.
@@ -67,6 +77,26 @@ pub(super) struct CellSize {
     pub(super) width: u16,
     /// Pixels down.
     pub(super) height: u16,
+    /// Plots are drawn so many times finer, then averaged: lines half a pixel thick show more of few
+    /// pixels.
+    pub(super) fine: u16,
+}
+
+impl CellSize {
+    /// The pixels of a cell in pictures of a protocol that has none of its own.
+    pub(super) fn of(protocol: Protocol) -> Self {
+        let (width, height, fine) = match protocol {
+            // Common cells; the terminal scales what it shows.
+            Protocol::Kitty | Protocol::Iterm2 | Protocol::Sixel => (8, 16, 1),
+            Protocol::Blocks => (2, 4, 1),
+            Protocol::Braille | Protocol::Ascii => (2, 4, 2),
+        };
+        CellSize {
+            width,
+            height,
+            fine,
+        }
+    }
 }
 
 /// Puts pictures into one area of the screen after another, and remembers what it has sent.
@@ -82,17 +112,21 @@ pub(super) trait Painter {
         aside: &mut Aside,
     );
 
-    /// All pictures of a frame are painted: those that are not among them leave the screen.
-    fn finish(&mut self, _: &mut Aside) {}
+    /// All pictures of a frame are painted, and all text on them: pictures that are not among them leave the
+    /// screen.
+    fn finish(&mut self, _: &mut Buffer, _: &mut Aside) {}
 
     /// The terminal is cleared, or given back: nothing that was sent is there any more.
     fn forget(&mut self, _: &mut Aside) {}
 }
 
-/// The painter of a protocol.
-pub(super) fn painter(protocol: Protocol, look: Look) -> Box<dyn Painter> {
-    match protocol {
-        Protocol::Kitty => Box::new(kitty::Kitty::default()),
+/// The painter of a choice.
+pub(super) fn painter(choice: &Choice, look: Look) -> Box<dyn Painter> {
+    let registers = choice.registers;
+    match choice.protocol {
+        Protocol::Kitty => Box::new(kitty::Kitty::new(choice.tmux)),
+        Protocol::Iterm2 => Box::new(inline::Inline::new(iterm2::Iterm2, choice.cell)),
+        Protocol::Sixel => Box::new(inline::Inline::new(sixel::Sixel { registers }, choice.cell)),
         Protocol::Blocks => Box::new(blocks::Blocks(look)),
         Protocol::Braille => Box::new(dots::Braille(look)),
         Protocol::Ascii => Box::new(dots::Ascii(look)),

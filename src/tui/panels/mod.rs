@@ -55,6 +55,7 @@ impl dyn Panel + '_ {
             subject: self.subject(state)?,
             size: state.pixels(area),
             text,
+            fine: usize::from(state.cell.fine),
             look: state.look,
         })
     }
@@ -71,6 +72,7 @@ impl dyn Panel + '_ {
             subject,
             size,
             text: 15.0,
+            fine: 1,
             look: state.look,
         })
     }

@@ -11,7 +11,7 @@ use crate::loom::test_looms::ring;
 use crate::mesh::Bounds;
 use crate::pipeline::plot::plot_loom;
 use crate::tui::event::{Answer, Command, Event};
-use crate::tui::graphics::{Aside, CellSize, Protocol, painter};
+use crate::tui::graphics::{Answers, Aside, CellSize, Protocol, choose, painter};
 use crate::tui::screen;
 use crate::tui::state::{Content, Front, Same, Scene, Signals, State};
 use crate::tui::theme::{Depth, Look};
@@ -27,6 +27,7 @@ const LOOK: Look = Look {
 const CELL: CellSize = CellSize {
     width: 2,
     height: 4,
+    fine: 2,
 };
 
 /// A studio with a loom open on a screen of that size, all of its pictures drawn.
@@ -87,7 +88,8 @@ fn mouse(state: &mut State, kind: MouseEventKind, column: u16, row: u16) {
 fn screen_text(state: &State) -> String {
     let area = Rect::new(0, 0, state.size.0, state.size.1);
     let mut buffer = Buffer::empty(area);
-    let mut painter = painter(Protocol::Ascii, LOOK);
+    let choice = choose(Some(Protocol::Ascii), &Answers::default(), false, true);
+    let mut painter = painter(&choice, LOOK);
     screen::draw(state, &mut *painter, &mut buffer, &mut Aside::default());
     let rows = buffer.content.chunks(usize::from(area.width).max(1));
     let row = |cells: &[ratatui::buffer::Cell]| -> String {
