@@ -30,6 +30,7 @@ mod run;
 mod sample;
 mod transfer;
 mod watch;
+mod watched;
 
 use std::process::ExitCode;
 

@@ -13,6 +13,7 @@ use super::report;
 use super::run::setting;
 use super::runs::{Runs, object};
 use super::session::{Outcome, Session};
+use super::watched::Studio;
 use crate::diag::{Diagnostic, Result, Severity};
 use crate::inbox::{Ending, Entry, Inbox, Job, Listed, Rules, State};
 use crate::io::{Depth, Disk, Outbox, Wake, Watch, listing};
@@ -27,6 +28,8 @@ const RELIST: Duration = Duration::from_secs(30);
 const GATHER: Duration = Duration::from_millis(50);
 /// Listings follow each other no faster, however much changes.
 const BREATH: Duration = Duration::from_millis(200);
+/// While the studio is open, its end is looked for this often.
+const GLANCE: Duration = Duration::from_millis(100);
 /// While captures are being processed, their ends are looked for this often.
 const LOOK: Duration = Duration::from_millis(20);
 
@@ -56,6 +59,10 @@ pub(super) struct Args {
     #[arg(long)]
     once: bool,
 
+    /// Show the captures and their states in the terminal, and open them in the studio
+    #[arg(long, conflicts_with = "once")]
+    studio: bool,
+
     /// Look for changes every two seconds instead of being told of them
     #[arg(long)]
     poll: bool,
@@ -70,6 +77,9 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args, session: &Session) -> Result<Outcome> {
+    if args.studio {
+        Studio::check(session)?;
+    }
     let recipe = recipes::find(session.world(), &args.recipe)?;
     let runs = Runs::new();
     let request = Request {
@@ -103,8 +113,20 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<Outcome> {
         ends,
         counts: BTreeMap::new(),
         states: BTreeMap::new(),
+        studio: None,
     };
-    std::thread::scope(|scope| watcher.run(scope, &watch))?;
+    std::thread::scope(|scope| {
+        if args.studio {
+            let results = shop.outbox.folder();
+            watcher.studio = Some(Studio::open(&args.folder, results, session));
+        }
+        let watched = watcher.run(scope, &watch);
+        watcher
+            .studio
+            .take()
+            .map_or(Ok(()), |studio| studio.end(&watched))?;
+        watched
+    })?;
     let counts = watcher.counts;
     let count = |name: &str| counts.get(name).copied().unwrap_or(0);
     Ok(Outcome {
@@ -138,6 +160,7 @@ struct Watcher<'a> {
     ends: Receiver<(String, Result<Json>)>,
     counts: BTreeMap<&'static str, usize>,
     states: BTreeMap<String, State>,
+    studio: Option<Studio>,
 }
 
 impl<'a> Watcher<'a> {
@@ -173,7 +196,14 @@ impl<'a> Watcher<'a> {
             if self.shop.args.once && self.inbox.is_drained() {
                 return Ok(());
             }
-            let wait = self.wait(begun.elapsed(), look);
+            let mut wait = self.wait(begun.elapsed(), look);
+            if let Some(studio) = &mut self.studio {
+                if studio.is_closed() {
+                    return Ok(());
+                }
+                studio.show(&self.inbox);
+                wait = wait.min(GLANCE);
+            }
             if let Wake::Changed(_) = watch.wait(wait) {
                 watch.calm(GATHER, BREATH, &mut Default::default());
                 look = true;
@@ -225,6 +255,9 @@ impl<'a> Watcher<'a> {
     }
 
     fn end(&mut self, name: &str, result: Result<Json>) -> Result<()> {
+        if let Some(studio) = &mut self.studio {
+            studio.note(name, &result);
+        }
         let (ending, told) = match result {
             Ok(report) => (
                 Ending::Done,
@@ -320,30 +353,11 @@ impl Shop<'_> {
     }
 
     fn request(&self, job: &Job, staged: &Path) -> Request {
-        let inputs = job
-            .capture
-            .inputs
-            .iter()
-            .map(|input| self.args.folder.join(input));
-        let cache = |path: &PathBuf| {
-            path.extension()
-                .is_some_and(|ending| ending == "pc2" || ending == "mdd")
-        };
-        let (caches, others): (Vec<PathBuf>, Vec<PathBuf>) = inputs.partition(cache);
-        // A point cache comes with the mesh of the same name.
-        let spec = match caches.as_slice() {
-            [] => InputSpec {
-                paths: others,
-                ..InputSpec::default()
-            },
-            _ => InputSpec {
-                paths: caches,
-                mesh: others.into_iter().next(),
-                ..InputSpec::default()
-            },
-        };
         Request {
-            input: Some(Input::Files(spec)),
+            input: Some(Input::Files(frames_of(
+                &self.args.folder,
+                &job.capture.inputs,
+            ))),
             settings: self.args.set.clone(),
             readable: Vec::new(),
             output: Some(staged.to_path_buf()),
@@ -363,6 +377,28 @@ impl Shop<'_> {
             }
         }
         Ok(())
+    }
+}
+
+/// How the frames of a capture are opened, whose inputs lie in the watched folder.
+pub(super) fn frames_of(folder: &Path, inputs: &[PathBuf]) -> InputSpec {
+    let inputs = inputs.iter().map(|input| folder.join(input));
+    let cache = |path: &PathBuf| {
+        path.extension()
+            .is_some_and(|ending| ending == "pc2" || ending == "mdd")
+    };
+    let (caches, others): (Vec<PathBuf>, Vec<PathBuf>) = inputs.partition(cache);
+    // A point cache comes with the mesh of the same name.
+    match caches.as_slice() {
+        [] => InputSpec {
+            paths: others,
+            ..InputSpec::default()
+        },
+        _ => InputSpec {
+            paths: caches,
+            mesh: others.into_iter().next(),
+            ..InputSpec::default()
+        },
     }
 }
 

@@ -254,6 +254,11 @@ impl Inbox {
                 .all(|(name, seen)| !self.is_due(name, seen))
     }
 
+    /// What a capture consists of.
+    pub fn capture(&self, name: &str) -> Option<&Capture> {
+        self.seen.get(name).map(|seen| &seen.capture)
+    }
+
     /// Every capture and where it stands.
     pub fn states(&self) -> impl Iterator<Item = (&str, State)> {
         self.seen.iter().map(|(name, seen)| {
