@@ -64,13 +64,19 @@ fn studio(shown: Shown, graphics: Option<Protocol>, session: &Session) -> Result
     Ok(Outcome::default())
 }
 
+/// The files of a capture that is looked at.
+pub(super) fn files(spec: InputSpec, name: String) -> Arc<dyn Files> {
+    let source = Source::Disk(spec);
+    Arc::new(Shown { source, name })
+}
+
 /// Whether there is a keyboard and a screen.
 pub(super) fn at_a_terminal() -> bool {
     refuse_pipes().is_ok()
 }
 
 /// The studio needs a keyboard and a screen.
-fn refuse_pipes() -> Result<()> {
+pub(super) fn refuse_pipes() -> Result<()> {
     let name = match (io::stdin().is_terminal(), io::stdout().is_terminal()) {
         (true, true) => return Ok(()),
         (false, _) => "stdin",
@@ -91,7 +97,7 @@ fn title(inputs: &[PathBuf]) -> String {
     inputs.first().map_or_else(String::new, |path| name(path))
 }
 
-fn options(name: String, graphics: Option<Protocol>) -> Options {
+pub(super) fn options(name: String, graphics: Option<Protocol>) -> Options {
     let variable = |name| std::env::var(name).unwrap_or_default();
     Options {
         name,

@@ -20,6 +20,8 @@ pub struct Fitted<'a> {
     pub pins: &'a [(usize, Point)],
     /// |z_i - psi(i)| over the root mean square distance of the frames from their mean.
     pub errors: &'a [f64],
+    /// Frames, from 1, between which the curve leaves their way.
+    pub astray: &'a [[f64; 2]],
 }
 
 /// The curve is sampled this often between frames, if it can be afforded.
@@ -30,10 +32,15 @@ const SAMPLES: usize = 2400;
 
 /// Map and time signals of a loom, as [`series`].
 pub fn plot_loom(loom: &Loom) -> (PoseSpace, TimeSignals) {
+    let spans = loom.report().spans.iter();
+    let astray: Vec<_> = spans
+        .map(|span| [span.first as f64, span.last as f64])
+        .collect();
     let fitted = Fitted {
         positions: &loom.layout().positions,
         pins: &loom.layout().pins,
         errors: &loom.frame_errors(),
+        astray: &astray,
     };
     series(loom.time(), loom.pose(), &fitted)
 }
@@ -78,6 +85,11 @@ pub fn series(time: &TimeSignal, pose: &PoseSignal, fitted: &Fitted) -> (PoseSpa
     } else {
         reached.clone()
     };
+    let astray = if known {
+        fitted.astray.to_vec()
+    } else {
+        Vec::new()
+    };
     let signals = TimeSignals {
         position: curve.clone(),
         speed: times.iter().filter_map(speed).collect(),
@@ -91,6 +103,7 @@ pub fn series(time: &TimeSignal, pose: &PoseSignal, fitted: &Fitted) -> (PoseSpa
             Vec::new()
         },
         times: times.clone(),
+        advice: astray.clone(),
         window: None,
     };
     let pins = fitted.pins.iter().filter(|_| known);
@@ -102,6 +115,7 @@ pub fn series(time: &TimeSignal, pose: &PoseSignal, fitted: &Fitted) -> (PoseSpa
         sites: pose.sites().to_vec(),
         controls: time.controls().to_vec(),
         pins: pins.map(|&(frame, at)| (frame + 1, at)).collect(),
+        advice: astray,
         ..PoseSpace::default()
     };
     (map, signals)
@@ -214,8 +228,13 @@ mod tests {
             positions: &positions,
             pins: &[(2, positions[2])],
             errors: &[0.1; 12],
+            astray: &[[3.0, 5.0]],
         };
         let (map, plots) = series(&time, &pose, &fitted);
+        assert_eq!(
+            (&map.advice, &plots.advice),
+            (&vec![[3.0, 5.0]], &vec![[3.0, 5.0]])
+        );
         assert_eq!(map.frames, positions);
         assert_eq!(map.pins, [(3, positions[2])]);
         assert_eq!((map.controls.len(), map.sites.len()), (8, 6));

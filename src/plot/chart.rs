@@ -63,6 +63,8 @@ pub struct Chart {
     pub panels: Vec<Panel>,
     /// Values of x marked by short strokes at the foot of the first panel, and what they are.
     pub rug: Option<(String, Vec<f64>)>,
+    /// Ranges of x set off in all panels.
+    pub bands: Vec<[f64; 2]>,
 }
 
 /// The chart in a picture of `width` x `height` pixels, and the plane of each panel. The legend stands
@@ -78,6 +80,7 @@ pub fn chart(chart: &Chart, width: f32, height: f32, theme: &Theme) -> (Scene, V
     let last = planes.len().saturating_sub(1);
     for (i, (panel, (plane, y))) in chart.panels.iter().zip(&planes).enumerate() {
         let x = chart.ticks(plane, theme);
+        chart.draw_bands(&mut scene, plane, theme);
         plane.draw_grid(&mut scene, theme, &x, y);
         if i == 0 {
             chart.draw_rug(&mut scene, plane, theme);
@@ -160,6 +163,18 @@ impl Chart {
             range,
             pixels,
             scale: self.scale,
+        }
+    }
+
+    fn draw_bands(&self, scene: &mut Scene, plane: &Plane, theme: &Theme) {
+        let Plane { area, x, .. } = plane;
+        for [from, to] in &self.bands {
+            let inside = |at: f64| x.pixel(at).clamp(area.left, area.right());
+            let (left, right) = (inside(*from), inside(*to));
+            // Never so narrow that it is not seen.
+            let wide = (right - left).max(theme.unit());
+            let band = Rect::new(left, area.top, wide, area.height);
+            scene.fill(Path::rect(band), theme.warning().with_alpha(0.25));
         }
     }
 

@@ -35,7 +35,10 @@ pub struct PoseSpace {
     pub marked: Vec<[f64; 2]>,
     /// Times between which the curve is set off, the first below the second.
     pub span: Option<[f64; 2]>,
-    /// Small pictures behind the curve: where their middles lie, and how wide they are in data units.
+    /// Times between which the curve leaves the way of the frames; set off as a warning.
+    pub advice: Vec<[f64; 2]>,
+    /// Small pictures behind everything, cut at the frame: where their middles lie, and how wide they are
+    /// in data units.
     pub pictures: Vec<([f64; 2], f64, Arc<Image>)>,
     /// Which part of the plane to show: x range, y range. `None` shows everything.
     pub window: Option<[[f64; 2]; 2]>,
@@ -65,6 +68,9 @@ pub fn pose_space(map: &PoseSpace, width: f32, height: f32, theme: &Theme) -> (S
     let room = Rect::new(0.0, top, width - right, height - top);
     let [x, y] = map.window.unwrap_or_else(|| map.ranges());
     let (plane, x, y) = Plane::isometric_in(room, x, y, theme);
+    if !map.pictures.is_empty() {
+        scene.clipped(plane.area, |scene| map.draw_pictures(scene, &plane));
+    }
     plane.draw_grid(&mut scene, theme, &x, &y);
     let beyond = map.sites_beyond(&plane);
     if map.window.is_some() || !beyond.is_empty() {
@@ -90,16 +96,7 @@ impl PoseSpace {
     fn points(&self) -> impl Iterator<Item = [f64; 2]> + '_ {
         let pins = self.pins.iter().map(|(_, at)| at);
         let lists = [&self.curve, &self.frames, &self.controls, &self.marked];
-        let pictures = self.pictures.iter().flat_map(|(at, wide, _)| {
-            let half = 0.5 * wide;
-            [[at[0] - half, at[1] - half], [at[0] + half, at[1] + half]]
-        });
-        lists
-            .into_iter()
-            .flatten()
-            .chain(pins)
-            .copied()
-            .chain(pictures)
+        lists.into_iter().flatten().chain(pins).copied()
     }
 
     fn time_range(&self) -> Option<[f64; 2]> {
@@ -115,6 +112,7 @@ impl PoseSpace {
             (marks.control, "control points", !self.controls.is_empty()),
             (marks.pin, "pins", !self.pins.is_empty()),
             (marks.end, "last frame", self.frames.len() > 1),
+            (marks.astray, "off the frames’ way", !self.advice.is_empty()),
         ];
         let present = entries.into_iter().filter(|entry| entry.2);
         let present: Vec<(Mark, &str)> = present.map(|(mark, name, _)| (mark, name)).collect();
@@ -149,7 +147,6 @@ impl PoseSpace {
 
     fn draw(&self, scene: &mut Scene, plane: &Plane, theme: &Theme) {
         let marks = Marks::of(theme);
-        self.draw_pictures(scene, plane);
         self.draw_controls(scene, plane, theme);
         let steps = self.steps(plane);
         self.draw_curve(scene, &steps, theme);
@@ -207,6 +204,12 @@ impl PoseSpace {
             let inside = steps.iter().filter(|(_, t)| (from..=to).contains(t));
             let inside: Vec<Point> = inside.map(|(at, _)| *at).collect();
             let wide = Stroke::new(theme.ink.with_alpha(0.85), 6.5 * theme.unit());
+            scene.stroke(Path::polyline(&inside), wide);
+        }
+        for [from, to] in &self.advice {
+            let inside = steps.iter().filter(|(_, t)| (from..=to).contains(&t));
+            let inside: Vec<Point> = inside.map(|(at, _)| *at).collect();
+            let wide = Stroke::new(theme.warning(), 8.0 * theme.unit());
             scene.stroke(Path::polyline(&inside), wide);
         }
         let color = self.colors(theme);
@@ -331,6 +334,7 @@ struct Marks {
     control: Mark,
     pin: Mark,
     end: Mark,
+    astray: Mark,
 }
 
 impl Marks {
@@ -342,6 +346,7 @@ impl Marks {
             control: Mark::Polygon(theme.series[1]),
             pin: Mark::Diamond(theme.series[3]),
             end: Mark::Square(theme.ink),
+            astray: Mark::Line(theme.warning()),
         }
     }
 }
@@ -530,6 +535,35 @@ mod tests {
         assert!(plane.area.contains(tips[0]));
         let middle = 0.5 * (plane.area.top + plane.area.bottom());
         assert!(tips[0][1] > middle, "the site lies below the map");
+    }
+
+    #[test]
+    fn stretches_off_the_way_are_set_off_below_the_curve() {
+        let map = PoseSpace {
+            advice: vec![[3.0, 5.0]],
+            ..spiral(12)
+        };
+        let theme = Theme::light();
+        let (scene, plane) = pose_space(&map, 640.0, 400.0, &theme);
+        let strokes = |item: &Item| match item {
+            Item::Path {
+                path,
+                stroke: Some(stroke),
+                ..
+            } if stroke.color == theme.warning() => Some(path.0.clone()),
+            _ => None,
+        };
+        let found: Vec<_> = scene.items.iter().filter_map(strokes).collect();
+        let wanted = map
+            .curve
+            .iter()
+            .zip(&map.times)
+            .find(|(_, t)| **t >= 3.0)
+            .unwrap();
+        let start =
+            |path: &Vec<Segment>| path.first() == Some(&Segment::Move(plane.pixel(*wanted.0)));
+        assert!(found.iter().any(start));
+        assert!(texts(&scene).any(|label| label.text.starts_with("off the")));
     }
 
     #[test]

@@ -86,6 +86,11 @@ impl Theme {
         }
     }
 
+    /// What is drawn attention to, below a line or behind it.
+    pub fn warning(&self) -> Color {
+        self.series[3].with_alpha(0.5)
+    }
+
     /// The colour of time at `share` in \[0, 1\] of the whole; outside it the ends' colours.
     pub fn time(&self, share: f64) -> Color {
         let share = (share.clamp(0.0, 1.0) * TIME_STEPS).round() / TIME_STEPS;

@@ -25,6 +25,8 @@ pub struct TimeSignals {
     pub error: Vec<f64>,
     /// Times at which the interior knots of f lie.
     pub knots: Vec<f64>,
+    /// Times between which the curve leaves the way of the frames; set off as a warning.
+    pub advice: Vec<[f64; 2]>,
     /// Which times to show; `None`: all.
     pub window: Option<[f64; 2]>,
 }
@@ -52,6 +54,7 @@ impl TimeSignals {
                 self.errors(),
             ],
             rug: Some(("knots".into(), self.knots.clone())),
+            bands: self.advice.clone(),
             ..Chart::default()
         }
     }

@@ -6,7 +6,8 @@ use std::time::Duration;
 
 use ratatui::crossterm::event::{KeyEvent, MouseEvent};
 
-use super::state::Content;
+use super::state::{Content, Same};
+use super::thumbs::{Thumb, ThumbWish};
 use super::work::{Picture, Wish};
 use crate::diag::Diagnostic;
 
@@ -45,6 +46,13 @@ pub(super) enum Answer {
         /// The picture.
         picture: Arc<Picture>,
     },
+    /// Small meshes for the map, so far.
+    Thumbs {
+        /// Number of the question.
+        number: u64,
+        /// What is drawn by now.
+        thumbs: Same<Vec<Thumb>>,
+    },
     /// Files were written.
     Saved(PathBuf),
     /// Files could not be written.
@@ -63,6 +71,8 @@ pub(super) enum Command {
         /// What it shows.
         wish: Wish,
     },
+    /// Small meshes for the map; an older question is replaced.
+    DrawThumbs(u64, ThumbWish),
     /// A picture to a PNG file of that name.
     SavePicture(String, Wish),
     /// The shown frames to files.

@@ -1,5 +1,7 @@
 //! One table binds the keys and documents them.
 
+use nucleo_matcher::pattern::{CaseMatching, Normalization, Pattern};
+use nucleo_matcher::{Config, Matcher};
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
 /// What a person can ask for; [`ACTIONS`] says what each does.
@@ -30,6 +32,9 @@ pub(super) enum Action {
     Roam,
     Wires,
     Onion,
+    Thumbs,
+    Errors,
+    Before,
     SavePicture,
     Export,
     Help,
@@ -86,6 +91,9 @@ actions! {
     Roam ["c"] "the cursor leaves the curve, or returns to it",
     Wires ["w"] "edges of the mesh",
     Onion ["o"] "onion skin: the frames before and after",
+    Thumbs ["m"] "small meshes behind the map",
+    Errors ["E"] "the mesh by its distance from the capture, as colour",
+    Before ["b"] "the mesh as it was fitted beside what became of it",
     SavePicture ["P"] "the panel to a PNG file",
     Export ["x"] "the frames between the marks (or all) to files",
     Help ["?"] "these keys",
@@ -166,40 +174,28 @@ impl LateAnswer {
     }
 }
 
-/// Actions whose words contain all letters of `typed` in order, those that have them closest together
-/// first.
+/// Actions whose words or keys match what was typed, fuzzily; the best first.
 pub(super) fn find(typed: &str) -> Vec<&'static Binding> {
-    let mut found: Vec<(usize, &Binding)> = ACTIONS
-        .iter()
-        .filter_map(|binding| Some((spread(binding.about, typed)?, binding)))
-        .collect();
-    found.sort_by_key(|&(spread, _)| spread);
-    found.into_iter().map(|(_, binding)| binding).collect()
+    let pattern = Pattern::parse(typed, CaseMatching::Smart, Normalization::Smart);
+    let mut matcher = Matcher::new(Config::DEFAULT);
+    let words = ACTIONS.iter().map(|binding| Words {
+        text: format!("{} {}", binding.about, binding.keys.join(" ")),
+        binding,
+    });
+    let found = pattern.match_list(words, &mut matcher);
+    found.into_iter().map(|(words, _)| words.binding).collect()
 }
 
-/// How many letters of `text` are skipped between those of `typed`; none if they are not there in order.
-fn spread(text: &str, typed: &str) -> Option<usize> {
-    let lower = text.to_lowercase();
-    let wanted = typed.to_lowercase();
-    let starts = lower.char_indices().map(|(at, _)| at);
-    starts.filter_map(|at| skipped(&lower[at..], &wanted)).min()
+/// What a search looks through.
+struct Words {
+    text: String,
+    binding: &'static Binding,
 }
 
-fn skipped(text: &str, wanted: &str) -> Option<usize> {
-    let mut letters = text.chars();
-    let mut passed = 0;
-    for (index, letter) in wanted.chars().enumerate() {
-        let before = letters
-            .by_ref()
-            .take_while(|&other| other != letter)
-            .count();
-        let missed = letters.as_str().is_empty() && !text.ends_with(letter);
-        if missed || (index == 0 && before > 0) {
-            return None;
-        }
-        passed += before;
+impl AsRef<str> for Words {
+    fn as_ref(&self) -> &str {
+        &self.text
     }
-    Some(passed)
 }
 
 #[cfg(test)]
@@ -270,6 +266,7 @@ mod tests {
         assert_eq!(find("onion")[0].action, Action::Onion);
         assert_eq!(find("png")[0].action, Action::SavePicture);
         assert_eq!(find("").len(), ACTIONS.len());
+        assert_eq!(find("frst frame")[0].action, Action::First);
         assert!(find("zzzz").is_empty());
     }
 }

@@ -9,9 +9,11 @@
 //! **Invariants:** `update` decides and draws nothing; panels draw and change nothing; work longer
 //! than a frame runs on worker threads, and answers to questions that are no longer asked are dropped.
 
+mod errors;
 mod event;
 mod graphics;
 mod keys;
+mod landings;
 mod layout;
 mod panels;
 mod screen;
@@ -19,10 +21,12 @@ mod state;
 mod studio;
 mod terminal;
 mod theme;
+mod thumbs;
 mod update;
 mod wire;
 mod work;
 
 pub use graphics::{Answers, Choice, Protocol, choose, query, read_answers};
+pub use landings::{Landing, News, Part, watch};
 pub use studio::{Files, Opened, Options, run};
 pub use terminal::{ask, restore};

@@ -3,6 +3,7 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Modifier;
+use ratatui::symbols::border::Set;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Clear, Paragraph, Widget};
 
@@ -75,6 +76,7 @@ fn draw_panel(
     };
     let panel = PANELS[index];
     Block::bordered()
+        .border_set(borders(state))
         .title(format!(" {} ", panel.title()))
         .border_style(state.look.style(role))
         .render(area, buffer);
@@ -83,7 +85,8 @@ fn draw_panel(
         return;
     }
     if let Some(picture) = &state.slots[index].shown {
-        painter.paint(index, &picture.image, inside, buffer, aside);
+        let canvas = state.canvas(index, area);
+        painter.paint(index, &picture.image, canvas, buffer, aside);
     } else if panel.subject(state).is_none() {
         let text = waiting(state, index);
         Paragraph::new(text)
@@ -91,6 +94,23 @@ fn draw_panel(
             .render(inside, buffer);
     }
     panel.draw(state, inside, buffer);
+}
+
+/// Lines around panels.
+fn borders(state: &State) -> Set<'static> {
+    if !state.plain_letters {
+        return ratatui::symbols::border::PLAIN;
+    }
+    Set {
+        top_left: "+",
+        top_right: "+",
+        bottom_left: "+",
+        bottom_right: "+",
+        vertical_left: "|",
+        vertical_right: "|",
+        horizontal_top: "-",
+        horizontal_bottom: "-",
+    }
 }
 
 /// What a panel without a picture waits for.
@@ -111,7 +131,12 @@ fn draw_status(state: &State, buffer: &mut Buffer) {
     let playback = &state.playback;
     let mut spans = vec![
         Span::styled(
-            if playback.playing { " ▶ " } else { " ∎ " },
+            match (playback.playing, state.plain_letters) {
+                (true, false) => " ▶ ",
+                (false, false) => " ∎ ",
+                (true, true) => " > ",
+                (false, true) => " . ",
+            },
             state.look.style(Role::Accent),
         ),
         Span::raw(format!("{} ", state.name)),
@@ -149,7 +174,9 @@ fn draw_status(state: &State, buffer: &mut Buffer) {
         }
         None => spans.push(Span::styled("? keys  q quit", muted)),
     }
-    Paragraph::new(Line::from(spans)).render(area, buffer);
+    Paragraph::new(Line::from(spans))
+        .style(state.look.bar())
+        .render(area, buffer);
 }
 
 /// A number without digits that say nothing.
@@ -171,6 +198,7 @@ fn front(state: &State, title: &str, size: (u16, u16), buffer: &mut Buffer) -> R
     let area = Rect::new(left, top, width, height);
     Clear.render(area, buffer);
     Block::bordered()
+        .border_set(borders(state))
         .title(format!(" {title} "))
         .border_style(state.look.style(Role::Accent))
         .style(state.look.front())
@@ -221,7 +249,7 @@ fn draw_palette(state: &State, typed: &str, chosen: usize, buffer: &mut Buffer) 
     if inside.height == 0 {
         return;
     }
-    let mut lines = vec![Line::raw(format!(": {typed}▏"))];
+    let mut lines = vec![Line::raw(format!(": {typed}_"))];
     let rows = usize::from(inside.height).saturating_sub(1);
     let first = (chosen + 1).saturating_sub(rows);
     for (index, binding) in found.iter().enumerate().skip(first) {

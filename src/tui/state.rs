@@ -8,11 +8,14 @@ use super::graphics::CellSize;
 use super::layout;
 use super::panels::PANELS;
 use super::theme::Look;
+use super::thumbs::{Thumb, ThumbWish};
 use super::work::{Picture, Wish};
 use crate::loom::Loom;
 use crate::mesh::{Bounds, FrameSource, Sequence};
 use crate::plot::{PoseSpace, TimeSignals};
 
+/// A cell needs this many pixels in height for letters in pictures to be read.
+const LEGIBLE: u16 = 10;
 /// Playback at this rate where the capture has none.
 const DEFAULT_FPS: f64 = 25.0;
 
@@ -29,14 +32,26 @@ pub(super) struct State {
     pub(super) roaming: Option<[f64; 2]>,
     /// The part of the map that is shown; none: all.
     pub(super) window: Option<[[f64; 2]; 2]>,
+    /// The small meshes behind the map.
+    pub(super) thumbs: Thumbs,
     /// How the mesh is looked at.
     pub(super) mesh: MeshView,
+    /// The capture, for the errors of its vertices; none where a loom was opened.
+    pub(super) capture: Option<Scene<Sequence>>,
+    /// The loom as it was first there.
+    pub(super) fitted: Option<Scene<Loom>>,
+    /// What else the mesh panel shows.
+    pub(super) aspect: Aspect,
+    /// Where the mouse was last seen.
+    pub(super) hover: Option<(u16, u16)>,
     /// Columns and rows.
     pub(super) size: (u16, u16),
     /// Pixels of a cell in pictures.
     pub(super) cell: CellSize,
     /// Colours.
     pub(super) look: Look,
+    /// Whether the font may lack everything but ASCII.
+    pub(super) plain_letters: bool,
     /// Index of the panel that keys speak to.
     pub(super) focus: usize,
     /// Whether it fills the screen.
@@ -165,6 +180,29 @@ pub(super) struct MeshView {
     pub(super) onion: bool,
 }
 
+/// What else the mesh panel shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) enum Aspect {
+    /// Nothing.
+    #[default]
+    Plain,
+    /// How far each vertex is from the capture's, as colour.
+    Errors,
+    /// The loom as it was first there beside what became of it.
+    Before,
+}
+
+/// The small meshes behind the map.
+#[derive(Debug, Default)]
+pub(super) struct Thumbs {
+    /// Whether they are not wanted.
+    pub(super) off: bool,
+    pub(super) shown: Option<Same<Vec<Thumb>>>,
+    /// Number of the question that `shown` answers.
+    pub(super) number: u64,
+    pub(super) asked: Option<ThumbWish>,
+}
+
 /// What stands in front of the panels.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Front {
@@ -215,10 +253,16 @@ impl State {
             },
             roaming: None,
             window: None,
+            thumbs: Thumbs::default(),
             mesh: MeshView::default(),
+            capture: None,
+            fitted: None,
+            aspect: Aspect::default(),
+            hover: None,
             size,
             cell,
             look,
+            plain_letters: false,
             focus: 0,
             enlarged: false,
             front: None,
@@ -284,6 +328,24 @@ impl State {
     /// The panels on the screen and where, borders included.
     pub(super) fn places(&self) -> Vec<(usize, Rect)> {
         layout::places(self.size, self.focus, self.enlarged)
+    }
+
+    /// Where the picture of a panel lies whose borders are `area`.
+    pub(super) fn canvas(&self, panel: usize, area: Rect) -> Rect {
+        PANELS[panel].canvas(self, layout::inner(area))
+    }
+
+    /// Whether pictures have pixels enough for letters.
+    pub(super) fn lettered(&self) -> bool {
+        self.cell.height >= LEGIBLE
+    }
+
+    /// Text in letters that the font has.
+    pub(super) fn written(&self, text: String) -> String {
+        if !self.plain_letters {
+            return text;
+        }
+        text.replace('−', "-").replace('₁', "1").replace('₂', "2")
     }
 
     /// What fits into `area` as a picture, in pixels.

@@ -4,6 +4,7 @@ use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
+use std::thread;
 use std::time::{Duration, Instant};
 
 use ratatui::buffer::Buffer;
@@ -18,6 +19,7 @@ use super::screen;
 use super::state::{Content, Same, Scene, Signals, Span, State};
 use super::terminal;
 use super::theme::{Depth, Look};
+use super::thumbs::{Newest, start_thumbs};
 use super::update::update;
 use super::wire::write_cells;
 use super::work::{Brush, Mailbox, Wish, start, start_painter};
@@ -88,41 +90,53 @@ pub struct Options {
     pub true_colour: bool,
 }
 
+impl Options {
+    /// How many colours there are.
+    pub(super) fn depth(&self) -> Depth {
+        match (self.colour, self.true_colour) {
+            (false, _) => Depth::Mono,
+            (true, false) => Depth::Indexed,
+            (true, true) => Depth::True,
+        }
+    }
+}
+
 /// Runs the studio until it is quit. `task` is cancelled when the program is to end.
 ///
 /// # Errors
 /// There is no terminal, or it is gone; cancellation.
 pub fn run(options: &Options, files: Arc<dyn Files>, task: &Task) -> Result<()> {
     let screen = size().map_err(lost)?;
-    let depth = match (options.colour, options.true_colour) {
-        (false, _) => Depth::Mono,
-        (true, false) => Depth::Indexed,
-        (true, true) => Depth::True,
-    };
     terminal::take().map_err(lost)?;
     let answers = terminal::ask(options.tmux);
     let choice = choose(options.graphics, &answers, options.tmux, options.colour);
     let dark = answers.background.is_none_or(is_dark);
-    let look = Look { dark, depth };
-    let state = State::new(options.name.clone(), screen, choice.cell, look);
+    let look = Look {
+        dark,
+        depth: options.depth(),
+    };
+    let mut state = State::new(options.name.clone(), screen, choice.cell, look);
+    state.plain_letters = choice.protocol == Protocol::Ascii;
     let (send, receive) = mpsc::channel();
     let mut studio = Studio::new(state, painter(&choice, look), files, send);
     let ended = studio.run(&receive, task);
     studio.cancel.cancel();
     studio.forget();
     terminal::restore();
+    // The keyboard is somebody else's again.
+    thread::sleep(WATCH);
     ended
 }
 
 #[expect(clippy::needless_pass_by_value, reason = "as map_err hands it over")]
-fn lost(error: io::Error) -> Box<Diagnostic> {
+pub(super) fn lost(error: io::Error) -> Box<Diagnostic> {
     Box::new(Diagnostic::error(format!(
         "the terminal cannot be used: {error}"
     )))
 }
 
 /// Whether light text stands out from this background more than dark text.
-fn is_dark([red, green, blue]: [u8; 3]) -> bool {
+pub(super) fn is_dark([red, green, blue]: [u8; 3]) -> bool {
     // BT.601, against the middle.
     299 * u32::from(red) + 587 * u32::from(green) + 114 * u32::from(blue) < 128_000
 }
@@ -135,6 +149,7 @@ struct Studio {
     /// Whether it is to be cleared first.
     stale: bool,
     mailbox: Arc<Mailbox>,
+    thumbs: Arc<Newest>,
     files: Arc<dyn Files>,
     events: Sender<Event>,
     /// Ends the work in the background.
@@ -155,6 +170,7 @@ impl Studio {
             state,
             painter,
             mailbox: Arc::default(),
+            thumbs: Arc::default(),
             files,
             events,
             cancel: Task::default(),
@@ -164,6 +180,7 @@ impl Studio {
 
     fn run(&mut self, receive: &Receiver<Event>, task: &Task) -> Result<()> {
         start_painter(Arc::clone(&self.mailbox), self.events.clone());
+        start_thumbs(Arc::clone(&self.thumbs), self.events.clone());
         self.start_opening();
         self.listen(task);
         self.draw()?;
@@ -211,6 +228,7 @@ impl Studio {
                 number,
                 wish,
             } => self.mailbox.ask(panel, number, wish),
+            Command::DrawThumbs(number, wish) => self.thumbs.ask(number, wish),
             Command::SavePicture(name, wish) => self.save_picture(name, wish),
             Command::Export(span) => self.export(span),
             Command::Redraw => self.stale = true,
@@ -256,10 +274,13 @@ impl Studio {
 
     /// Keys, mouse, sizes and signals become events.
     fn listen(&self, task: &Task) {
-        let (events, task) = (self.events.clone(), task.clone());
+        let (events, task, ended) = (self.events.clone(), task.clone(), self.cancel.clone());
         start("keyboard", move || {
             let (begin, mut late) = (Instant::now(), LateAnswer::default());
             loop {
+                if ended.cancelled() {
+                    return;
+                }
                 if task.cancelled() {
                     let _ = events.send(Event::Signal);
                     return;

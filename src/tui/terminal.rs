@@ -88,7 +88,20 @@ pub(super) fn send(bytes: &[u8]) -> io::Result<()> {
 /// waited for 200 ms.
 pub fn ask(tmux: bool) -> Answers {
     // A terminal that cannot be asked has said nothing.
-    read_answers(&exchange(tmux).unwrap_or_default())
+    let mut answers = read_answers(&exchange(tmux).unwrap_or_default());
+    if !tmux {
+        answers.cell = answers.cell.or_else(window_cell);
+    }
+    answers
+}
+
+/// Columns and rows of a cell in pixels by the size of the window, where the system knows it: a little too
+/// small rather than too large.
+fn window_cell() -> Option<(u16, u16)> {
+    let window = ratatui::crossterm::terminal::window_size().ok()?;
+    let across = window.width.checked_div(window.columns)?;
+    let down = window.height.checked_div(window.rows)?;
+    (across > 0 && down > 0).then_some((across, down))
 }
 
 /// The bytes that came back.

@@ -64,6 +64,19 @@ impl Look {
         }
     }
 
+    /// The status line, and read-outs on borders.
+    pub(super) fn bar(self) -> Style {
+        let ground = if self.dark {
+            [0x26, 0x2a, 0x31]
+        } else {
+            [0xe4, 0xe6, 0xea]
+        };
+        match self.depth {
+            Depth::Mono => Style::new(),
+            _ => Style::new().bg(self.colour(ground)),
+        }
+    }
+
     /// A colour as this terminal shows it.
     pub(super) fn colour(self, rgb: [u8; 3]) -> Color {
         match self.depth {

@@ -7,10 +7,9 @@ use ratatui::layout::Rect;
 
 use super::event::{Answer, Command, Event};
 use super::keys::{self, Action};
-use super::layout::{inner, tabbed, tabs};
-use super::panels::{MAP, MESH, PANELS, TIME, map};
-use super::state::{Content, Drag, Front, Notice, State};
-use super::work::Picture;
+use super::layout::{tabbed, tabs};
+use super::panels::{MAP, MESH, PANELS, TIME, map, mesh};
+use super::state::{Aspect, Content, Drag, Front, Notice, State};
 
 /// Slowest and fastest playback.
 const SPEEDS: [f64; 8] = [0.1, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
@@ -42,6 +41,9 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Command> {
         }
         Event::Signal => vec![Command::Quit],
     };
+    if let (None, Content::Loom(scene, _)) = (&state.fitted, &state.content) {
+        state.fitted = Some(scene.clone());
+    }
     commands.extend(questions(state));
     commands
 }
@@ -50,7 +52,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Command> {
 fn questions(state: &mut State) -> Vec<Command> {
     let mut commands = Vec::new();
     for (index, area) in state.places() {
-        let wish = PANELS[index].wish(state, inner(area));
+        let wish = PANELS[index].wish(state, state.canvas(index, area));
         if wish.is_none() || wish == state.slots[index].asked {
             continue;
         }
@@ -63,7 +65,19 @@ fn questions(state: &mut State) -> Vec<Command> {
             wish,
         }));
     }
+    commands.extend(thumbs_question(state));
     commands
+}
+
+/// Small meshes for the map that is shown, unless they have been asked for.
+fn thumbs_question(state: &mut State) -> Option<Command> {
+    let wish = map::thumbs(state)?;
+    if state.thumbs.asked.as_ref() == Some(&wish) {
+        return None;
+    }
+    state.asked += 1;
+    state.thumbs.asked = Some(wish.clone());
+    Some(Command::DrawThumbs(state.asked, wish))
 }
 
 fn on_answer(state: &mut State, answer: Answer) {
@@ -73,6 +87,9 @@ fn on_answer(state: &mut State, answer: Answer) {
                 Content::Loom(..) => None,
                 _ => state.work,
             };
+            if let Content::Capture(scene) = &*content {
+                state.capture = Some(scene.clone());
+            }
             state.content = *content;
             state.playback.t = state.playback.t.min(state.frames() as f64);
             if let Some(warning) = warnings.first() {
@@ -93,6 +110,12 @@ fn on_answer(state: &mut State, answer: Answer) {
             if number > slot.number {
                 slot.number = number;
                 slot.shown = Some(picture);
+            }
+        }
+        Answer::Thumbs { number, thumbs } => {
+            if number >= state.thumbs.number {
+                state.thumbs.number = number;
+                state.thumbs.shown = Some(thumbs);
             }
         }
         Answer::Saved(path) => say(state, format!("written: {}", path.display()), false),
@@ -201,6 +224,9 @@ fn act(state: &mut State, action: Action) -> Vec<Command> {
         Action::Roam => roam(state),
         Action::Wires => state.mesh.wires = !state.mesh.wires,
         Action::Onion => state.mesh.onion = !state.mesh.onion,
+        Action::Thumbs => state.thumbs.off = !state.thumbs.off,
+        Action::Errors => toggle(state, Aspect::Errors),
+        Action::Before => toggle(state, Aspect::Before),
         Action::Help => state.front = Some(Front::Help(0)),
         Action::Palette => state.front = Some(Front::Palette(String::new(), 0)),
         Action::Leave => state.roaming = None,
@@ -258,6 +284,27 @@ fn move_view(state: &mut State, [right, up]: [f64; 2]) {
         }));
     } else if state.focus == MESH {
         orbit(state, right * TURN, up * TURN);
+    }
+}
+
+/// Shows that aspect of the mesh, or no longer.
+fn toggle(state: &mut State, aspect: Aspect) {
+    let lacking = match aspect {
+        Aspect::Errors if state.capture.is_none() => {
+            "a loom keeps no frames: open its capture to see the errors"
+        }
+        Aspect::Errors if mesh::comparable(state).is_none() => {
+            "the frames are no longer the capture's"
+        }
+        Aspect::Before if state.fitted.is_none() => "there is no loom yet",
+        _ => "",
+    };
+    if state.aspect == aspect {
+        state.aspect = Aspect::Plain;
+    } else if lacking.is_empty() {
+        state.aspect = aspect;
+    } else {
+        say(state, lacking.to_string(), true);
     }
 }
 
@@ -329,6 +376,7 @@ fn on_mouse(state: &mut State, mouse: MouseEvent) -> Vec<Command> {
         }
         return Vec::new();
     }
+    state.hover = Some((mouse.column, mouse.row));
     match mouse.kind {
         MouseEventKind::Down(button) => press(state, mouse, button),
         MouseEventKind::Drag(_) => drag(state, mouse),
@@ -400,7 +448,7 @@ fn drag(state: &mut State, mouse: MouseEvent) {
             2.0 * TURN_PER_CELL * moved[1],
         );
     } else if held.view && held.panel == MAP {
-        let inside = inner(area);
+        let inside = state.canvas(MAP, area);
         let window = map::window(state);
         let cells = [
             f64::from(inside.width.max(1)),
@@ -420,7 +468,8 @@ fn point(state: &mut State, panel: usize, area: Rect, mouse: MouseEvent) {
     let Some(picture) = state.slots[panel].shown.clone() else {
         return;
     };
-    let at = pixel(&picture, inner(area), mouse);
+    let canvas = state.canvas(panel, area);
+    let at = picture.pixel(canvas, (mouse.column, mouse.row));
     if panel == TIME {
         let t = picture.planes.first().map(|plane| plane.x.value(at[0]));
         if let Some(t) = t.filter(|t| t.is_finite()) {
@@ -429,7 +478,7 @@ fn point(state: &mut State, panel: usize, area: Rect, mouse: MouseEvent) {
     } else if panel == MAP
         && let Some(plane) = picture.planes.first()
     {
-        let reach = 2.0 * picture.image.width as f32 / f32::from(inner(area).width.max(1));
+        let reach = 2.0 * picture.image.width as f32 / f32::from(canvas.width.max(1));
         match map::nearest_time(state, plane, at, reach) {
             Some(t) => scrub(state, t),
             None => {
@@ -438,17 +487,6 @@ fn point(state: &mut State, panel: usize, area: Rect, mouse: MouseEvent) {
             }
         }
     }
-}
-
-/// The pixel of a picture in `area` that lies in the middle of the cell under the mouse.
-fn pixel(picture: &Picture, area: Rect, mouse: MouseEvent) -> [f32; 2] {
-    let share = |at: u16, start: u16, length: u16| {
-        (f32::from(at) - f32::from(start) + 0.5) / f32::from(length.max(1))
-    };
-    [
-        share(mouse.column, area.x, area.width) * picture.image.width as f32,
-        share(mouse.row, area.y, area.height) * picture.image.height as f32,
-    ]
 }
 
 fn turn_wheel(state: &mut State, mouse: MouseEvent, factor: f64) {
@@ -461,7 +499,8 @@ fn turn_wheel(state: &mut State, mouse: MouseEvent, factor: f64) {
     }
     let about = state.slots[panel].shown.as_ref().and_then(|picture| {
         let plane = picture.planes.first()?;
-        Some(plane.data(pixel(picture, inner(area), mouse)))
+        let canvas = state.canvas(panel, area);
+        Some(plane.data(picture.pixel(canvas, (mouse.column, mouse.row))))
     });
     zoom(state, panel, factor, about);
 }

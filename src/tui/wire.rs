@@ -280,7 +280,7 @@ mod tests {
         let screen = parser.screen();
         assert_eq!(
             screen.contents().trim_end(),
-            "\n   héllo 字 x      a\n\n\n\nend"
+            "\n   héllo 字 x       a\n\n\n\nend"
         );
         let cell = screen.cell(1, 4).unwrap();
         assert!(cell.bold() && cell.fgcolor() == vt100::Color::Idx(208));

@@ -7,9 +7,13 @@ use std::sync::mpsc::Sender;
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread;
 
+use ratatui::layout::Rect;
+
+use super::errors::Errors;
 use super::event::{Answer, Event};
 use super::state::{MeshView, Same, Scene, Signals};
 use super::theme::Look;
+use super::thumbs::Thumb;
 use crate::image::Image;
 use crate::loom::{Loom, Scratch};
 use crate::mesh::{Bounds, FrameSource, Sequence, Topology};
@@ -45,11 +49,19 @@ pub(super) enum Subject {
         signals: Same<Signals>,
         window: Option<[[f64; 2]; 2]>,
         span: Option<[f64; 2]>,
+        thumbs: Option<Same<Vec<Thumb>>>,
     },
     /// The signals over time.
     Times(Same<Signals>),
     /// The mesh.
-    Mesh(Pose, MeshView),
+    Mesh {
+        pose: Pose,
+        view: MeshView,
+        /// Vertices are coloured by how far they are from these frames.
+        capture: Option<Scene<Sequence>>,
+        /// What is shown beside it.
+        before: Option<Pose>,
+    },
 }
 
 /// Which mesh.
@@ -69,6 +81,21 @@ pub(super) struct Picture {
     pub(super) image: Image,
     /// One for a map, one for each of the time signals, none for a mesh.
     pub(super) planes: Vec<Plane>,
+    /// What is to be said about it.
+    pub(super) note: String,
+}
+
+impl Picture {
+    /// The pixel in the middle of a cell of `canvas`, which the picture fills.
+    pub(super) fn pixel(&self, canvas: Rect, (column, row): (u16, u16)) -> [f32; 2] {
+        let share = |at: u16, start: u16, length: u16| {
+            (f32::from(at) - f32::from(start) + 0.5) / f32::from(length.max(1))
+        };
+        [
+            share(column, canvas.x, canvas.width) * self.image.width as f32,
+            share(row, canvas.y, canvas.height) * self.image.height as f32,
+        ]
+    }
 }
 
 /// Buffers that pictures are drawn with.
@@ -77,6 +104,9 @@ pub(super) struct Brush {
     renderer: Renderer,
     scratch: Scratch,
     positions: Vec<f32>,
+    /// Of the vertices, where they are coloured.
+    colours: Vec<[u8; 3]>,
+    errors: Option<Errors>,
 }
 
 impl Brush {
@@ -90,12 +120,20 @@ impl Brush {
                 signals,
                 window,
                 span,
+                thumbs,
             } => {
                 let mut map = signals.0.map.clone();
                 (map.window, map.span) = (*window, *span);
+                if let Some(thumbs) = thumbs {
+                    map.pictures.clone_from(&thumbs.0);
+                }
                 if wish.text == 0.0 {
+                    // Marks are letters on top.
                     map.frames.clear();
                     map.reached.clear();
+                    map.sites.clear();
+                    map.controls.clear();
+                    map.pins.clear();
                 }
                 let (scene, plane) = pose_space(&map, width, height, &theme);
                 picture(&scene, vec![plane], fine)
@@ -108,22 +146,61 @@ impl Brush {
                 let (scene, planes) = time_signals(&signals.0.times, width, height, &theme);
                 picture(&scene, planes, fine)
             }
-            Subject::Mesh(pose, view) => Picture {
-                image: self.mesh(pose, view, wish, &theme),
-                planes: Vec::new(),
-            },
+            Subject::Mesh {
+                pose,
+                view,
+                capture,
+                before,
+            } => {
+                let note = self.colour(pose, capture.as_ref());
+                let half = ((wish.size.0 / 2).max(1), wish.size.1);
+                let size = if before.is_some() { half } else { wish.size };
+                let mut image = self.mesh(pose, view, wish, size, &theme);
+                if let Some(before) = before {
+                    self.colours.clear();
+                    let left = self.mesh(before, view, wish, size, &theme);
+                    image = beside(&left, &image, wish.size);
+                }
+                Picture {
+                    image,
+                    planes: Vec::new(),
+                    note,
+                }
+            }
         }
     }
 
-    fn mesh(&mut self, pose: &Pose, view: &MeshView, wish: &Wish, theme: &Theme) -> Image {
-        // Few pixels are drawn twice as fine, so that outlines are smooth.
-        let fine = if wish.size.0 * wish.size.1 < 60_000 {
-            2
-        } else {
-            1
+    /// Prepares colours for the vertices' errors; says what they mean.
+    fn colour(&mut self, pose: &Pose, capture: Option<&Scene<Sequence>>) -> String {
+        self.colours.clear();
+        let (Some(capture), Pose::Time(scene, t)) = (capture, pose) else {
+            return String::new();
         };
-        let mut image = Image::new(fine * wish.size.0, fine * wish.size.1);
-        let camera = camera(&pose.bounds(), view, wish.size);
+        if !self
+            .errors
+            .as_ref()
+            .is_some_and(|errors| errors.is_of(scene, capture))
+        {
+            self.errors = Some(Errors::new(scene, capture));
+        }
+        let Some(errors) = &mut self.errors else {
+            return String::new();
+        };
+        errors.colour(*t, &mut self.colours)
+    }
+
+    fn mesh(
+        &mut self,
+        pose: &Pose,
+        view: &MeshView,
+        wish: &Wish,
+        size: (usize, usize),
+        theme: &Theme,
+    ) -> Image {
+        // Few pixels are drawn twice as fine, so that outlines are smooth.
+        let fine = if size.0 * size.1 < 60_000 { 2 } else { 1 };
+        let mut image = Image::new(fine * size.0, fine * size.1);
+        let camera = camera(&pose.bounds(), view, size);
         let wire = view.wires.then(|| Wire {
             colour: rgb(theme.series[0].0),
             width: fine as f32,
@@ -142,6 +219,7 @@ impl Brush {
                 wire: None,
                 ..style
             };
+            let colours = std::mem::take(&mut self.colours);
             for time in there {
                 self.layer(
                     &Pose::Time(scene.clone(), time),
@@ -150,6 +228,7 @@ impl Brush {
                     &mut image,
                 );
             }
+            self.colours = colours;
         }
         self.layer(pose, &camera, &style, &mut image);
         if fine == 2 { image.halved() } else { image }
@@ -177,7 +256,7 @@ impl Brush {
         let surface = Surface {
             triangles: topology.triangles(),
             positions: &self.positions,
-            colours: None,
+            colours: (self.colours.len() == topology.vertices()).then_some(&self.colours),
         };
         self.renderer.overlay(surface, camera, style, image);
     }
@@ -192,6 +271,7 @@ fn picture(scene: &plot::Scene, planes: Vec<Plane>, fine: usize) -> Picture {
     Picture {
         planes: planes.collect(),
         image,
+        note: String::new(),
     }
 }
 
@@ -218,6 +298,7 @@ fn coarse(signals: &TimeSignals) -> Chart {
     let coordinate = |axis: usize| line(2 * axis, &mut signals.position.iter().map(|p| p[axis]));
     Chart {
         range: signals.window,
+        bands: signals.advice.clone(),
         panels: vec![
             Panel {
                 series: vec![coordinate(0), coordinate(1)],
@@ -256,6 +337,23 @@ fn camera(bounds: &Bounds, view: &MeshView, size: (usize, usize)) -> Camera {
     (camera.yaw, camera.pitch) = (view.yaw, view.pitch);
     camera.zoom(view.zoom);
     camera
+}
+
+/// Two pictures side by side, in one of that size.
+fn beside(left: &Image, right: &Image, (width, height): (usize, usize)) -> Image {
+    let mut both = Image::new(width, height);
+    for (y, row) in both.rgba.chunks_exact_mut(4 * width.max(1)).enumerate() {
+        for (image, start) in [(left, 0), (right, left.width)] {
+            let from = &image.rgba[4 * image.width * y..4 * image.width * (y + 1)];
+            let (start, end) = (4 * start, (4 * (start + image.width)).min(row.len()));
+            row[start..end].copy_from_slice(&from[..end - start]);
+        }
+        // An odd last column.
+        if width > 2 * right.width {
+            row.copy_within(4 * (width - 2)..4 * (width - 1), 4 * (width - 1));
+        }
+    }
+    both
 }
 
 fn rgb(colour: [u8; 4]) -> [u8; 3] {

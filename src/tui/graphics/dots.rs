@@ -1,5 +1,5 @@
 //! Shapes without two colours a cell: braille dots, and letters by their darkness. Both take 2 x 4
-//! pixels a cell and set what stands out from the picture's corner.
+//! pixels a cell and set what stands out from the background.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -25,7 +25,7 @@ pub(super) struct Ascii(pub(super) Look);
 
 impl Painter for Braille {
     fn paint(&mut self, _: usize, image: &Image, area: Rect, buffer: &mut Buffer, _: &mut Aside) {
-        let ground = lightness(pixel(image, 0, 0));
+        let ground = ground(self.0);
         cells(area, buffer, |column, row, cell| {
             let mut bits = 0;
             let mut colour = None;
@@ -51,7 +51,7 @@ impl Painter for Braille {
 
 impl Painter for Ascii {
     fn paint(&mut self, _: usize, image: &Image, area: Rect, buffer: &mut Buffer, _: &mut Aside) {
-        let ground = lightness(pixel(image, 0, 0));
+        let ground = ground(self.0);
         cells(area, buffer, |column, row, cell| {
             let mut sum = 0;
             let mut strongest = (0, [0; 3]);
@@ -68,6 +68,12 @@ impl Painter for Ascii {
             tint(cell, self.0, (letter != b' ').then_some(strongest.1));
         });
     }
+}
+
+/// What does not stand out: the lightness of a picture's background.
+fn ground(look: Look) -> u32 {
+    let [red, green, blue, _] = look.plot(0.0).background.0;
+    lightness([red, green, blue])
 }
 
 fn cells(

@@ -236,6 +236,7 @@ mod tests {
         width: 1,
         height: 1,
         fine: 1,
+        shades: true,
     };
     const AREA: Rect = Rect::new(2, 1, 3, 2);
 

@@ -80,6 +80,8 @@ pub(super) struct CellSize {
     /// Plots are drawn so many times finer, then averaged: lines half a pixel thick show more of few
     /// pixels.
     pub(super) fine: u16,
+    /// Whether surfaces show by their shades, not lines only.
+    pub(super) shades: bool,
 }
 
 impl CellSize {
@@ -88,13 +90,13 @@ impl CellSize {
         let (width, height, fine) = match protocol {
             // Common cells; the terminal scales what it shows.
             Protocol::Kitty | Protocol::Iterm2 | Protocol::Sixel => (8, 16, 1),
-            Protocol::Blocks => (2, 4, 1),
-            Protocol::Braille | Protocol::Ascii => (2, 4, 2),
+            Protocol::Blocks | Protocol::Braille | Protocol::Ascii => (2, 4, 2),
         };
         CellSize {
             width,
             height,
             fine,
+            shades: !matches!(protocol, Protocol::Braille | Protocol::Ascii),
         }
     }
 }

@@ -3,10 +3,11 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::{MAP, Panel, cell_of};
+use super::{MAP, Panel, cell_of, gutter, read_out};
 use crate::plot::Plane;
-use crate::tui::state::State;
+use crate::tui::state::{Content, State};
 use crate::tui::theme::Role;
+use crate::tui::thumbs::ThumbWish;
 use crate::tui::work::Subject;
 
 /// The map.
@@ -25,21 +26,43 @@ impl Panel for Map {
             signals,
             window: state.window,
             span: marked.then_some([span.from, span.to]),
+            thumbs: state.thumbs.shown.clone().filter(|_| !state.thumbs.off),
         })
+    }
+
+    fn canvas(&self, state: &State, area: Rect) -> Rect {
+        gutter::canvas(state, area)
     }
 
     fn draw(&self, state: &State, area: Rect, buffer: &mut Buffer) {
         let Some(picture) = &state.slots[MAP].shown else {
             return;
         };
+        let canvas = self.canvas(state, area);
+        gutter::draw(state, picture, area, canvas, buffer);
+        let (panel, area) = (area, canvas);
+        draw_marks(state, area, buffer);
+        if let Some((frame, at)) = hovered_frame(state, area) {
+            let text = format!(" frame {frame} ");
+            let wide = text.chars().count() as u16;
+            let left = (at.0 + 2)
+                .min(area.right().saturating_sub(wide))
+                .max(area.x);
+            let row = if at.1 > area.y { at.1 - 1 } else { at.1 + 1 };
+            if wide <= area.width && row < area.bottom() {
+                let style = state.look.style(Role::Mark).patch(state.look.bar());
+                buffer.set_string(left, row, text, style);
+            }
+        }
         let (Some(plane), Some(at)) = (picture.planes.first(), state.cursor()) else {
             return;
         };
         if let Some(cell) = cell_of(picture, plane, at, area).and_then(|at| buffer.cell_mut(at)) {
-            let symbol = if state.roaming.is_some() {
-                "✛"
-            } else {
-                "●"
+            let symbol = match (state.roaming.is_some(), state.plain_letters) {
+                (true, false) => "✛",
+                (true, true) => "X",
+                (false, false) => "●",
+                (false, true) => "O",
             };
             cell.set_symbol(symbol)
                 .set_style(state.look.style(Role::Accent));
@@ -51,12 +74,102 @@ impl Panel for Map {
             "f(t) ="
         };
         let text = format!(" {place} {x:.4}, {y:.4} ");
-        let width = text.chars().count() as u16;
-        if width <= area.width {
-            let left = area.right() - width;
-            buffer.set_string(left, area.bottom() - 1, text, state.look.style(Role::Muted));
+        read_out(state, Role::Muted, &text, panel, buffer);
+    }
+}
+
+/// Sites, control points and pins as letters, where there are few pixels.
+fn draw_marks(state: &State, canvas: Rect, buffer: &mut Buffer) {
+    let (Some(picture), Some(signals)) = (&state.slots[MAP].shown, state.signals()) else {
+        return;
+    };
+    let Some(plane) = picture.planes.first().filter(|_| !state.lettered()) else {
+        return;
+    };
+    let theme = state.look.plot(0.0);
+    let map = &signals.0.map;
+    let pins: Vec<[f64; 2]> = map.pins.iter().map(|pin| pin.1).collect();
+    let marks = [
+        ("∘", theme.series[0], &map.sites),
+        ("+", theme.series[1], &map.controls),
+        ("◆", theme.series[3], &pins),
+    ];
+    for (symbol, colour, points) in marks {
+        let [red, green, blue, _] = colour.0;
+        for &point in points {
+            let at = cell_of(picture, plane, point, canvas);
+            if let Some(cell) = at.and_then(|at| buffer.cell_mut(at)) {
+                let symbol = if state.plain_letters {
+                    plain(symbol)
+                } else {
+                    symbol
+                };
+                cell.set_symbol(symbol);
+                cell.set_fg(state.look.colour([red, green, blue]));
+            }
         }
     }
+}
+
+/// The same without letters that a font may lack.
+fn plain(symbol: &str) -> &str {
+    match symbol {
+        "∘" => "o",
+        "◆" => "^",
+        other => other,
+    }
+}
+
+/// Least pixels of the largest small meshes, and where pictures have few pixels.
+const LEAST: f64 = 64.0;
+const LEAST_COARSE: f64 = 48.0;
+
+/// The small meshes that the map as it is shown wants; none without a picture that could show them.
+pub(in crate::tui) fn thumbs(state: &State) -> Option<ThumbWish> {
+    let Content::Loom(scene, _) = &state.content else {
+        return None;
+    };
+    let picture = state.slots[MAP].shown.as_ref()?;
+    let plane = picture.planes.first()?;
+    if state.thumbs.off || !state.cell.shades || !state.places().iter().any(|place| place.0 == MAP)
+    {
+        return None;
+    }
+    let least = if state.lettered() {
+        LEAST
+    } else {
+        LEAST_COARSE
+    };
+    let width = f64::from(plane.area.width);
+    let window = [plane.x.range, plane.y.range];
+    (width > least).then(|| {
+        ThumbWish::new(
+            scene.clone(),
+            window,
+            (width, least),
+            state.mesh,
+            state.look,
+        )
+    })
+}
+
+/// A frame is under the mouse where it is at most so many columns away.
+const REACH: f32 = 1.5;
+
+/// The frame under the mouse, from 1, and the cell of the mouse.
+fn hovered_frame(state: &State, canvas: Rect) -> Option<(usize, (u16, u16))> {
+    let at = state.hover.filter(|&at| canvas.contains(at.into()))?;
+    let picture = state.slots[MAP].shown.as_ref()?;
+    let plane = picture.planes.first()?;
+    let pixel = picture.pixel(canvas, at);
+    let column = picture.image.width as f32 / f32::from(canvas.width.max(1));
+    let frames = state.signals()?.0.map.frames.iter().enumerate();
+    let distances = frames.map(|(index, &place)| {
+        let [x, y] = plane.pixel(place);
+        (index + 1, (x - pixel[0]).hypot(y - pixel[1]))
+    });
+    let nearest = distances.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    (nearest.1 <= REACH * column).then_some((nearest.0, at))
 }
 
 /// The part of the map that is shown: x range, y range.

@@ -3,8 +3,10 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::Panel;
-use crate::tui::state::{Content, State};
+use super::{MESH, Panel, read_out};
+use crate::mesh::{FrameSource, Sequence};
+use crate::tui::state::{Aspect, Content, Scene, State};
+use crate::tui::theme::Role;
 use crate::tui::work::{Pose, Subject};
 
 /// The mesh at the cursor.
@@ -30,8 +32,49 @@ impl Panel for Mesh {
             (Content::Loom(scene, _), None) => Pose::Time(scene.clone(), t),
             (Content::Loom(scene, _), Some(at)) => Pose::Place(scene.clone(), at),
         };
-        Some(Subject::Mesh(pose, state.mesh))
+        let (mut capture, mut before) = (None, None);
+        match state.aspect {
+            Aspect::Plain => {}
+            Aspect::Errors => capture = comparable(state),
+            Aspect::Before => before = self.before(state),
+        }
+        Some(Subject::Mesh {
+            pose,
+            view: state.mesh,
+            capture,
+            before,
+        })
     }
 
-    fn draw(&self, _: &State, _: Rect, _: &mut Buffer) {}
+    fn draw(&self, state: &State, area: Rect, buffer: &mut Buffer) {
+        let Some(picture) = &state.slots[MESH].shown else {
+            return;
+        };
+        let muted = state.look.style(Role::Muted).patch(state.look.bar());
+        read_out(state, Role::Muted, &picture.note, area, buffer);
+        if state.aspect == Aspect::Before && self.before(state).is_some() && area.width >= 20 {
+            let middle = area.x + area.width / 2;
+            buffer.set_string(area.x, area.y, " before ", muted);
+            buffer.set_string(middle, area.y, " now ", muted);
+        }
+    }
+}
+
+impl Mesh {
+    /// The loom as it was first there, at the same time or place.
+    fn before(&self, state: &State) -> Option<Pose> {
+        let scene = state.fitted.clone()?;
+        let last = scene.of.0.frames() as f64;
+        Some(match state.roaming {
+            Some(at) => Pose::Place(scene, at),
+            None => Pose::Time(scene, state.playback.t.min(last)),
+        })
+    }
+}
+
+/// The capture, where the loom's frames are still its frames.
+pub(in crate::tui) fn comparable(state: &State) -> Option<Scene<Sequence>> {
+    let (loom, capture) = (state.loom()?, state.capture.as_ref()?);
+    let same = loom.frames() == capture.of.0.frames() && loom.time().warps().is_empty();
+    same.then(|| capture.clone())
 }

@@ -1,14 +1,16 @@
 //! Panels: each says which picture it wants and draws cells on top of it. They change nothing.
 
 mod details;
+mod gutter;
 pub(super) mod map;
-mod mesh;
+pub(super) mod mesh;
 mod time;
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::state::State;
+use super::theme::Role;
 use super::work::{Picture, Subject, Wish};
 use crate::plot::Plane;
 
@@ -20,7 +22,12 @@ pub(super) trait Panel: Sync {
     /// What its picture shows; none where there is nothing to show yet, or never a picture.
     fn subject(&self, state: &State) -> Option<Subject>;
 
-    /// Draws text and cursors over the picture.
+    /// The part of `area` that its picture fills.
+    fn canvas(&self, _: &State, area: Rect) -> Rect {
+        area
+    }
+
+    /// Draws text and cursors on `area` over the picture.
     fn draw(&self, state: &State, area: Rect, buffer: &mut Buffer);
 }
 
@@ -36,20 +43,16 @@ pub(super) const MESH: usize = 2;
 /// Index of the words about the loom.
 pub(super) const DETAILS: usize = 3;
 
-/// A cell needs this many pixels in height for letters in pictures to be read.
-const LEGIBLE: u16 = 10;
-
 impl dyn Panel + '_ {
     /// The picture for `area` on the screen.
     pub(super) fn wish(&self, state: &State, area: Rect) -> Option<Wish> {
         if area.is_empty() {
             return None;
         }
-        let height = state.cell.height;
-        let text = if height < LEGIBLE {
-            0.0
+        let text = if state.lettered() {
+            0.72 * f32::from(state.cell.height)
         } else {
-            0.72 * f32::from(height)
+            0.0
         };
         Some(Wish {
             subject: self.subject(state)?,
@@ -75,6 +78,16 @@ impl dyn Panel + '_ {
             fine: 1,
             look: state.look,
         })
+    }
+}
+
+/// Writes a read-out on the border below `area`, at its right end; nothing where it is too long.
+fn read_out(state: &State, role: Role, text: &str, area: Rect, buffer: &mut Buffer) {
+    let text = state.written(text.to_string());
+    let wide = text.chars().count() as u16;
+    if wide <= area.width {
+        let style = state.look.style(role).patch(state.look.bar());
+        buffer.set_string(area.right() - wide, area.bottom(), text, style);
     }
 }
 

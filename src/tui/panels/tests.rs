@@ -15,6 +15,7 @@ use crate::tui::graphics::{Answers, Aside, CellSize, Protocol, choose, painter};
 use crate::tui::screen;
 use crate::tui::state::{Content, Front, Same, Scene, Signals, State};
 use crate::tui::theme::{Depth, Look};
+use crate::tui::thumbs::Bench;
 use crate::tui::update::update;
 use crate::tui::work::Brush;
 
@@ -28,11 +29,17 @@ const CELL: CellSize = CellSize {
     width: 2,
     height: 4,
     fine: 2,
+    shades: false,
 };
+
+/// A studio with nothing open yet.
+pub(super) fn studio_of(name: &str, size: (u16, u16), look: Look) -> State {
+    State::new(name.into(), size, CELL, look)
+}
 
 /// A studio with a loom open on a screen of that size, all of its pictures drawn.
 fn studio(size: (u16, u16)) -> State {
-    let mut state = State::new("ring".into(), size, CELL, LOOK);
+    let mut state = studio_of("ring", size, LOOK);
     let loom = ring(20, 15, false);
     let bounds = Bounds::of(&loom.at(1.0).unwrap()).unwrap();
     let (map, times) = plot_loom(&loom);
@@ -47,7 +54,7 @@ fn studio(size: (u16, u16)) -> State {
 }
 
 /// An event, and answers to all questions that it raises; the other commands.
-fn send(state: &mut State, event: Event) -> Vec<Command> {
+pub(super) fn send(state: &mut State, event: Event) -> Vec<Command> {
     let mut others = Vec::new();
     for command in update(state, event) {
         match command {
@@ -70,7 +77,7 @@ fn send(state: &mut State, event: Event) -> Vec<Command> {
     others
 }
 
-fn press(state: &mut State, code: KeyCode) -> Vec<Command> {
+pub(super) fn press(state: &mut State, code: KeyCode) -> Vec<Command> {
     send(state, Event::Key(KeyEvent::new(code, KeyModifiers::NONE)))
 }
 
@@ -86,11 +93,17 @@ fn mouse(state: &mut State, kind: MouseEventKind, column: u16, row: u16) {
 }
 
 fn screen_text(state: &State) -> String {
+    screen(state, Protocol::Ascii)
+}
+
+/// The screen as text, by a protocol of letters.
+pub(super) fn screen(state: &State, protocol: Protocol) -> String {
+    let choice = choose(Some(protocol), &Answers::default(), false, true);
+    let mut painter = painter(&choice, state.look);
     let area = Rect::new(0, 0, state.size.0, state.size.1);
-    let mut buffer = Buffer::empty(area);
-    let choice = choose(Some(Protocol::Ascii), &Answers::default(), false, true);
-    let mut painter = painter(&choice, LOOK);
-    screen::draw(state, &mut *painter, &mut buffer, &mut Aside::default());
+    let (mut buffer, mut aside) = (Buffer::empty(area), Aside::default());
+    screen::draw(state, &mut *painter, &mut buffer, &mut aside);
+    painter.finish(&mut buffer, &mut aside);
     let rows = buffer.content.chunks(usize::from(area.width).max(1));
     let row = |cells: &[ratatui::buffer::Cell]| -> String {
         let text: String = cells.iter().map(ratatui::buffer::Cell::symbol).collect();
@@ -121,9 +134,10 @@ fn every_size_and_state_is_drawn_without_a_panic() {
         (80, 24),
         (120, 36),
         (240, 70),
+        (500, 200),
     ] {
         let mut state = studio(size);
-        for key in ['?', 'x', ':', 'o'] {
+        for key in ['?', 'x', ':', 'o', 'b', 'E'] {
             screen_text(&state);
             press(&mut state, KeyCode::Char(key));
         }
@@ -274,4 +288,87 @@ fn writing_asks_for_what_is_shown() {
     let exported = press(&mut state, KeyCode::Char('x'));
     assert!(matches!(exported[..], [Command::Export(span)] if (span.from, span.to) == (4.0, 9.0)));
     assert_eq!(press(&mut state, KeyCode::Char('q')), [Command::Quit]);
+}
+
+/// A studio in blocks, as a terminal with colours has it.
+fn coloured(dark: bool) -> State {
+    let look = Look {
+        dark,
+        depth: Depth::True,
+    };
+    let cell = CellSize::of(Protocol::Blocks);
+    let mut state = State::new("ring".into(), (120, 36), cell, look);
+    let loom = ring(20, 15, false);
+    let bounds = Bounds::of(&loom.at(1.0).unwrap()).unwrap();
+    let (map, times) = plot_loom(&loom);
+    let scene = Scene {
+        of: Same::new(loom),
+        bounds,
+    };
+    let content = Content::Loom(scene, Same::new(Signals { map, times }));
+    let opened = Answer::Opened(Box::new(content), Vec::new());
+    for command in send(&mut state, Event::Answer(opened)) {
+        if let Command::DrawThumbs(number, wish) = command {
+            let thumbs = Same::new(Bench::default().all(&wish));
+            send(&mut state, Event::Answer(Answer::Thumbs { number, thumbs }));
+        }
+    }
+    state
+}
+
+#[test]
+fn small_meshes_cover_the_map_and_are_asked_for_once() {
+    let mut state = coloured(true);
+    let thumbs = state.thumbs.shown.clone().expect("small meshes");
+    assert!(thumbs.0.len() >= 6, "{}", thumbs.0.len());
+    let lit = |image: &crate::image::Image| image.rgba.chunks(4).any(|pixel| pixel[3] > 0);
+    assert!(thumbs.0.iter().filter(|(_, _, image)| lit(image)).count() > thumbs.0.len() / 2);
+    let again = update(&mut state, Event::Tick(std::time::Duration::ZERO));
+    assert!(again.is_empty(), "{again:?}");
+    let scrubbed = update(
+        &mut state,
+        Event::Key(KeyEvent::new(KeyCode::Right, KeyModifiers::NONE)),
+    );
+    assert!(matches!(scrubbed[..], [Command::Draw { panel: MESH, .. }]));
+}
+
+#[test]
+fn turning_the_mesh_turns_the_small_ones() {
+    let mut state = coloured(true);
+    state.focus = MESH;
+    let turned = press(&mut state, KeyCode::Char('l'));
+    let [Command::DrawThumbs(_, wish)] = &turned[..] else {
+        panic!("{turned:?}");
+    };
+    assert_eq!(wish.view.yaw, state.mesh.yaw);
+    let off = press(&mut state, KeyCode::Char('m'));
+    assert!(off.is_empty() && state.thumbs.off, "{off:?}");
+}
+
+#[test]
+fn light_and_dark_terminals_get_their_own_colours() {
+    use ratatui::style::Color;
+    for dark in [true, false] {
+        let state = coloured(dark);
+        let image = &state.slots[MAP].shown.as_ref().unwrap().image;
+        assert_eq!(image.rgba[0] < 128, dark);
+        let style = state.look.style(crate::tui::theme::Role::Accent);
+        let Some(Color::Rgb(red, green, blue)) = style.fg else {
+            panic!("{style:?}");
+        };
+        let light = u32::from(red) + u32::from(green) + u32::from(blue);
+        assert_eq!(light > 380, dark);
+    }
+}
+
+#[test]
+fn the_mouse_names_the_frame_below_it() {
+    let mut state = coloured(true);
+    let (_, area) = *state.places().iter().find(|place| place.0 == MAP).unwrap();
+    let canvas = state.canvas(MAP, area);
+    let picture = state.slots[MAP].shown.clone().unwrap();
+    let place = state.signals().unwrap().0.map.frames[6];
+    let at = super::cell_of(&picture, &picture.planes[0], place, canvas).unwrap();
+    mouse(&mut state, MouseEventKind::Moved, at.0, at.1);
+    assert!(screen(&state, Protocol::Ascii).contains(" frame 7 "));
 }

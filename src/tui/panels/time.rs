@@ -3,7 +3,7 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::{Panel, TIME};
+use super::{Panel, TIME, gutter, read_out};
 use crate::tui::state::State;
 use crate::tui::theme::Role;
 use crate::tui::work::{Picture, Subject};
@@ -20,10 +20,17 @@ impl Panel for Time {
         state.signals().cloned().map(Subject::Times)
     }
 
+    fn canvas(&self, state: &State, area: Rect) -> Rect {
+        gutter::canvas(state, area)
+    }
+
     fn draw(&self, state: &State, area: Rect, buffer: &mut Buffer) {
         let Some(picture) = &state.slots[TIME].shown else {
             return;
         };
+        let canvas = self.canvas(state, area);
+        gutter::draw(state, picture, area, canvas, buffer);
+        let (panel, area) = (area, canvas);
         for (mark, symbol) in state.playback.marks.iter().zip(["[", "]"]) {
             if let Some(t) = mark {
                 upright(picture, *t, area, |x, y| {
@@ -36,11 +43,35 @@ impl Panel for Time {
         }
         upright(picture, state.playback.t, area, |x, y| {
             if let Some(cell) = buffer.cell_mut((x, y)) {
-                cell.set_symbol("│")
+                let line = if state.plain_letters { "|" } else { "│" };
+                cell.set_symbol(line)
                     .set_style(state.look.style(Role::Accent));
             }
         });
+        let read = state.hover.filter(|&at| area.contains(at.into()));
+        let t =
+            read.and_then(|at| Some(picture.planes.first()?.x.value(picture.pixel(area, at)[0])));
+        if let Some(text) = t.and_then(|t| values(state, t)) {
+            read_out(state, Role::Mark, &text, panel, buffer);
+        }
     }
+}
+
+/// The signals at a time, in words.
+fn values(state: &State, t: f64) -> Option<String> {
+    let loom = state.loom()?;
+    let t = t.clamp(1.0, loom.frames() as f64);
+    let [x, y] = loom.position_at(t).ok()?;
+    let [vx, vy] = loom.time().velocity(t)?;
+    let frame = t.round() as usize;
+    let errors = &state.signals()?.0.times.error;
+    let error = errors.get(frame - 1).map_or_else(String::new, |error| {
+        format!("  error of frame {frame} {:.3} %", 100.0 * error)
+    });
+    Some(format!(
+        " t {t:.2}  p₁ {x:.4}  p₂ {y:.4}  speed {:.4}{error} ",
+        vx.hypot(vy)
+    ))
 }
 
 /// Visits the cells of a vertical line at a time, through all planes.
