@@ -136,6 +136,14 @@ impl Files for Shown {
         let Source::Disk(spec) = &self.source else {
             return Ok(None);
         };
+        // A loom has no first frame that could be read alone.
+        if spec
+            .paths
+            .iter()
+            .any(|path| path.extension().is_some_and(|ending| ending == "loom"))
+        {
+            return Ok(None);
+        }
         let start = spec.range.and_then(|range| range.first).unwrap_or(1);
         let range = FrameRange {
             first: Some(start),

@@ -104,7 +104,11 @@ mod tests {
 
     fn drawn(painter: &mut dyn Painter, lit: &[(usize, usize)]) -> String {
         let mut image = Image::new(4, 4);
-        image.fill([0, 0, 0, 255]);
+        let look = Look {
+            dark: true,
+            depth: Depth::Mono,
+        };
+        image.fill(look.plot(0.0).background.0);
         for (x, y) in lit {
             image.rgba[4 * (y * 4 + x)..][..3].fill(255);
         }

@@ -110,4 +110,6 @@ fn cell_of(picture: &Picture, plane: &Plane, point: [f64; 2], area: Rect) -> Opt
 }
 
 #[cfg(test)]
+mod snapshots;
+#[cfg(test)]
 mod tests;

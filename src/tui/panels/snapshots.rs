@@ -1,0 +1,155 @@
+//! What a person sees, as text that a person can read: whole screens in letters, kept beside this file.
+
+use ratatui::crossterm::event::KeyCode;
+
+use super::tests::{press, screen, send, studio_of};
+use crate::loom::fit::{FitOptions, fit};
+use crate::mesh::{Bounds, Sequence, Topology};
+use crate::pipeline::plot::plot_loom;
+use crate::task::Task;
+use crate::tui::event::{Answer, Event};
+use crate::tui::graphics::Protocol;
+use crate::tui::state::{Content, Same, Scene, Signals, State};
+use crate::tui::theme::{Depth, Look};
+
+/// Frames of the bar's swing.
+const FRAMES: usize = 16;
+/// Rings of the bar.
+const RINGS: usize = 12;
+
+const LOOK: Look = Look {
+    dark: true,
+    depth: Depth::Mono,
+};
+
+/// A square bar that bends from side to side and back a little higher.
+fn bar(frames: usize) -> Sequence {
+    let mut positions = Vec::new();
+    for frame in 0..frames {
+        let phase = std::f64::consts::TAU * frame as f64 / FRAMES as f64;
+        let (bend, lift) = (0.9 * libm::sin(phase), 0.4 * libm::cos(phase));
+        for ring in 0..=RINGS {
+            let along = ring as f64 / RINGS as f64 - 0.5;
+            let (turn, high) = (bend * along, lift * along * along);
+            for corner in 0..4 {
+                let (side, up) = (
+                    [-0.12, 0.12, 0.12, -0.12][corner],
+                    [-0.12, -0.12, 0.12, 0.12][corner],
+                );
+                let x = 2.0 * along + side * libm::sin(turn);
+                let y = up + high - 1.2 * bend * along * along;
+                positions.extend([x, y, side * libm::cos(turn)].map(|at| at as f32));
+            }
+        }
+    }
+    let mut faces = Vec::new();
+    for ring in 0..RINGS as u32 {
+        for corner in 0..4 {
+            let (a, b) = (4 * ring + corner, 4 * ring + (corner + 1) % 4);
+            faces.extend([[a, b, a + 4], [b, b + 4, a + 4]]);
+        }
+    }
+    let topology = Topology::from_triangles(4 * (RINGS + 1), &faces).unwrap();
+    Sequence::new(topology.into(), positions, Some(24.0))
+}
+
+/// The studio with the bar open: its frames, then the loom.
+fn studio(size: (u16, u16), frames: usize) -> State {
+    let mut state = studio_of("bar", size, LOOK);
+    state.plain_letters = true;
+    let capture = bar(frames);
+    let bounds = Bounds::of_frames(&capture).unwrap().unwrap();
+    let options = FitOptions {
+        left_out: false,
+        ..FitOptions::default()
+    };
+    let loom = fit(&capture, &options, &Task::default()).unwrap().output;
+    let scene = Scene {
+        of: Same::new(capture),
+        bounds,
+    };
+    let opened = |content| Event::Answer(Answer::Opened(Box::new(content), Vec::new()));
+    send(&mut state, opened(Content::Capture(scene)));
+    let (map, times) = plot_loom(&loom);
+    let scene = Scene {
+        of: Same::new(loom),
+        bounds,
+    };
+    let content = Content::Loom(scene, Same::new(Signals { map, times }));
+    send(&mut state, opened(content));
+    state
+}
+
+fn keys(state: &mut State, keys: &str) {
+    for key in keys.chars() {
+        press(state, KeyCode::Char(key));
+    }
+}
+
+fn letters(state: &State) -> String {
+    screen(state, Protocol::Ascii)
+}
+
+#[test]
+fn a_small_screen_has_tabs() {
+    let mut state = studio((80, 24), FRAMES);
+    press(&mut state, KeyCode::Right);
+    insta::assert_snapshot!("tabs_80x24", letters(&state));
+}
+
+#[test]
+fn a_usual_screen_has_three_panels() {
+    let mut state = studio((120, 36), FRAMES);
+    keys(&mut state, "[");
+    for _ in 0..5 {
+        press(&mut state, KeyCode::Right);
+    }
+    keys(&mut state, "]");
+    insta::assert_snapshot!("panels_120x36", letters(&state));
+}
+
+#[test]
+fn a_large_screen_has_words_too() {
+    let state = studio((240, 70), FRAMES);
+    insta::assert_snapshot!("panels_240x70", letters(&state));
+}
+
+#[test]
+fn without_colours_there_is_braille() {
+    let mut state = studio((120, 36), FRAMES);
+    state.plain_letters = false;
+    keys(&mut state, "w");
+    insta::assert_snapshot!("braille_120x36", screen(&state, Protocol::Braille));
+}
+
+#[test]
+fn the_cursor_off_the_curve_and_a_closer_look() {
+    let mut state = studio((80, 24), FRAMES);
+    keys(&mut state, "++c");
+    for _ in 0..6 {
+        press(&mut state, KeyCode::Left);
+    }
+    insta::assert_snapshot!("roaming_80x24", letters(&state));
+}
+
+#[test]
+fn before_and_after_stand_side_by_side() {
+    let mut state = studio((80, 24), FRAMES);
+    keys(&mut state, "b");
+    press(&mut state, KeyCode::BackTab);
+    press(&mut state, KeyCode::BackTab);
+    insta::assert_snapshot!("before_80x24", letters(&state));
+}
+
+#[test]
+fn the_palette_finds_actions() {
+    let mut state = studio((80, 24), FRAMES);
+    keys(&mut state, ":loop");
+    insta::assert_snapshot!("palette_80x24", letters(&state));
+}
+
+#[test]
+fn one_frame_is_a_point_and_no_curve() {
+    let state = studio((120, 36), 1);
+    insta::assert_snapshot!("one_frame_120x36", letters(&state));
+}
