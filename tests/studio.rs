@@ -1,5 +1,7 @@
 //! The real binary in a terminal of its own: what a person sees, and what is left behind.
 
+mod support;
+
 use std::io::{Read, Write};
 use std::num::NonZero;
 use std::path::Path;
@@ -27,7 +29,17 @@ struct Screen {
 }
 
 impl Screen {
-    fn open(folder: &Path, arguments: &[&str], (columns, rows): (u16, u16)) -> Self {
+    fn open(folder: &Path, arguments: &[&str], size: (u16, u16)) -> Self {
+        Self::open_with(folder, arguments, size, "true")
+    }
+
+    /// With that as the user's editor.
+    fn open_with(
+        folder: &Path,
+        arguments: &[&str],
+        (columns, rows): (u16, u16),
+        editor: &str,
+    ) -> Self {
         let size = PtySize {
             rows,
             cols: columns,
@@ -40,6 +52,8 @@ impl Screen {
         command.cwd(folder);
         command.env("TERM", "xterm-256color");
         command.env("COLORTERM", "truecolor");
+        command.env("MESHLOOM_CACHE", folder.join(".cache"));
+        command.env("VISUAL", editor);
         command.env_remove("NO_COLOR");
         command.env_remove("TMUX");
         let child = pair.slave.spawn_command(command).unwrap();
@@ -184,7 +198,7 @@ fn the_mouse_scrubs_on_the_signals() {
             .contents()
             .lines()
             .nth(28)
-            .is_some_and(|row| row.matches('│').count() >= 3)
+            .is_some_and(|row| row.matches('│').count() >= 5)
     });
     screen.press("\x1b[<0;60;30M\x1b[<0;60;30m");
     screen.wait_until("a later frame", |screen| {
@@ -225,7 +239,9 @@ fn a_demo_is_fitted_while_it_is_looked_at() {
     });
     screen.press("q");
     assert_eq!(screen.ended(), 0);
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    let there = std::fs::read_dir(folder.path()).unwrap();
+    let names = there.map(|entry| entry.unwrap().file_name());
+    assert_eq!(names.collect::<Vec<_>>(), [".cache"]);
 }
 
 #[test]
@@ -289,4 +305,241 @@ fn without_a_terminal_it_says_what_to_run_instead() {
         said.contains("stdin is none") && said.contains("meshloom fit"),
         "{said}"
     );
+}
+
+/// Waits until the file holds what is wanted.
+fn wait_for_text(path: &Path, holds: impl Fn(&str) -> bool) -> String {
+    let start = Instant::now();
+    loop {
+        let text = std::fs::read_to_string(path).unwrap_or_default();
+        if holds(&text) {
+            return text;
+        }
+        assert!(start.elapsed() < PATIENCE, "never written: {text}");
+        thread::sleep(Duration::from_millis(5));
+    }
+}
+
+impl Screen {
+    /// Where a symbol stands: column and row from 1, as the mouse tells them.
+    fn find(&self, symbol: &str) -> Option<(u16, u16)> {
+        let parser = self.shown.lock().unwrap();
+        let (rows, columns) = parser.screen().size();
+        let (rows, columns) = (rows.get(), columns.get());
+        let cells = (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column)));
+        let shows = |&(row, column): &(u16, u16)| {
+            let cell = parser.screen().cell(row, column);
+            cell.is_some_and(|cell| cell.contents() == symbol)
+        };
+        let (row, column) = cells.into_iter().find(shows)?;
+        Some((column + 1, row + 1))
+    }
+
+    /// The left button goes down at one place, moves to another, and goes up.
+    fn drag(&mut self, from: (u16, u16), to: (u16, u16)) {
+        let (a, b) = (from, to);
+        self.press(&format!("\x1b[<0;{};{}M", a.0, a.1));
+        self.press(&format!("\x1b[<32;{};{}M", b.0, b.1));
+        self.press(&format!("\x1b[<0;{};{}m", b.0, b.1));
+    }
+
+    fn signal(&self, signal: &str) {
+        let id = self.child.process_id().unwrap().to_string();
+        let kill = std::process::Command::new("kill")
+            .args([signal, &id])
+            .status();
+        assert!(kill.unwrap().success());
+    }
+}
+
+const OURS: &str = "// ours\nload(\"bar.loom\")\n";
+
+/// A folder with `bar.loom` and a recipe on it.
+fn kitchen(recipe: &str) -> TempDir {
+    let folder = folder();
+    std::fs::write(folder.path().join("r.rhai"), recipe).unwrap();
+    folder
+}
+
+#[test]
+fn a_control_point_dragged_is_a_line_and_dragged_again_the_same_line() {
+    let folder = kitchen(OURS);
+    let file = folder.path().join("r.rhai");
+    let arguments = ["open", "bar.loom", "--recipe", "r.rhai"];
+    let mut screen = Screen::open(folder.path(), &arguments, (120, 36));
+    screen.wait("a loom of 12 frames");
+    screen.press("G");
+    screen.wait("frame 12.00/12");
+    screen.press("d");
+    screen.wait_until("a control point in hand", |screen| {
+        screen.contents().contains('◈')
+    });
+    let at = screen.find("◈").unwrap();
+    screen.press("\x1b");
+    screen.wait_until("nothing in hand", |screen| !screen.contents().contains('◈'));
+    let to = (at.0 - 4, at.1 + 2);
+    screen.drag(at, to);
+    let once = wait_for_text(&file, |text| text.contains(".move_control("));
+    assert!(
+        once.starts_with("// ours\nload(\"bar.loom\")\n    .move_control("),
+        "{once}"
+    );
+    screen.wait(".move_control(");
+    screen.wait_until("the run's end", |screen| {
+        !screen.contents().contains("running")
+    });
+    screen.drag(to, (to.0 - 3, to.1));
+    let twice = wait_for_text(&file, |text| text != once);
+    assert_eq!(twice.matches(".move_control(").count(), 1, "{twice}");
+    assert_eq!(twice.lines().count(), 3);
+    screen.press("u");
+    wait_for_text(&file, |text| text == once);
+    screen.press("u");
+    wait_for_text(&file, |text| text == OURS);
+    screen.press("\x12");
+    wait_for_text(&file, |text| text == once);
+    screen.press("x");
+    screen.wait("written: bar-frames-1");
+    screen.press("q");
+    assert_eq!(screen.ended(), 0);
+}
+
+#[test]
+fn a_recipe_saved_elsewhere_runs_again_and_an_error_keeps_the_last_result() {
+    let folder = kitchen(OURS);
+    let file = folder.path().join("r.rhai");
+    let arguments = ["open", "bar.loom", "--recipe", "r.rhai"];
+    let mut screen = Screen::open(folder.path(), &arguments, (120, 36));
+    screen.wait("a loom of 12 frames");
+    std::fs::write(&file, "load(\"bar.loom\").hold(3, 5)\n").unwrap();
+    screen.wait("a loom of 17 frames");
+    screen.wait("/17");
+    std::fs::write(&file, "load(\"bar.loom\")\n    .revers()\n").unwrap();
+    screen.wait("no function `revers`");
+    screen.wait("did you mean `reverse`?");
+    assert!(screen.text().contains("/17"), "{}", screen.text());
+    // Editors that rename: a new file in the old one's place.
+    let staged = folder.path().join("staged");
+    std::fs::write(&staged, "load(\"bar.loom\").hold(3, 7)\n").unwrap();
+    std::fs::rename(&staged, &file).unwrap();
+    screen.wait("a loom of 19 frames");
+    screen.wait_until("no error", |screen| {
+        !screen.contents().contains("no function")
+    });
+    screen.press("u");
+    wait_for_text(&file, |text| text.contains("revers()"));
+    screen.press("q");
+    assert_eq!(screen.ended(), 0);
+}
+
+#[test]
+fn a_module_that_is_saved_runs_the_recipe_again() {
+    let folder = kitchen("import \"steps\" as steps;\nload(\"bar.loom\").hold(3, steps::many())\n");
+    let module = folder.path().join("steps.rhai");
+    std::fs::write(&module, "fn many() { 2 }\n").unwrap();
+    let arguments = ["open", "bar.loom", "--recipe", "r.rhai"];
+    let mut screen = Screen::open(folder.path(), &arguments, (120, 36));
+    screen.wait("a loom of 14 frames");
+    std::fs::write(&module, "fn many() { 4 }\n").unwrap();
+    screen.wait("a loom of 16 frames");
+    screen.press("q");
+    assert_eq!(screen.ended(), 0);
+}
+
+#[test]
+fn a_capture_gets_its_recipe_beside_it_with_the_first_gesture() {
+    let folder = tempfile::tempdir().unwrap();
+    support::capture::sheet(5, 12).write_objs(&folder.path().join("sheet"));
+    let file = folder.path().join("sheet.rhai");
+    let mut screen = Screen::open(folder.path(), &["open", "sheet"], (120, 36));
+    screen.wait("not saved yet");
+    screen.wait("a loom of 12 frames");
+    assert!(!file.exists());
+    screen.press("i");
+    screen.wait("pin of frame 1");
+    screen.press("\x1b[1;2C\r");
+    let pinned = wait_for_text(&file, |text| !text.is_empty());
+    assert!(
+        pinned.starts_with("fit(input())\n    .pin(1, ["),
+        "{pinned}"
+    );
+    screen.wait("recipe: sheet.rhai");
+    screen.wait_until("the run's end", |screen| {
+        !screen.contents().contains("running")
+    });
+    screen.press("I");
+    wait_for_text(&file, |text| text == "fit(input())\n");
+    screen.press("\x1b[C\x1b[C[\x1b[C\x1b[C\x1b[C]T");
+    wait_for_text(&file, |text| text == "fit(input())\n    .trim(3, 6)\n");
+    screen.wait("a loom of 4 frames");
+    screen.press("q");
+    assert_eq!(screen.ended(), 0);
+}
+
+#[test]
+fn a_recipe_that_does_not_parse_at_start_is_shown_and_mended() {
+    let folder = kitchen("// one\nload(\"bar.loom\"\n");
+    let arguments = ["open", "bar.loom", "--recipe", "r.rhai"];
+    let mut screen = Screen::open(folder.path(), &arguments, (120, 36));
+    screen.wait("load(\"bar.loom\"");
+    screen.wait("^");
+    screen.wait("frame 1.00/12");
+    std::fs::write(folder.path().join("r.rhai"), OURS).unwrap();
+    screen.wait("a loom of 12 frames");
+    screen.press("q");
+    assert_eq!(screen.ended(), 0);
+}
+
+#[test]
+fn sliders_change_the_recipe() {
+    let folder =
+        kitchen("let still = param(\"still\", 2, 0, 8);\nload(\"bar.loom\").hold(3, still)\n");
+    let arguments = ["open", "bar.loom", "--recipe", "r.rhai"];
+    let mut screen = Screen::open(folder.path(), &arguments, (120, 36));
+    screen.wait("a loom of 14 frames");
+    screen.press("\t\t\t\x1b[C");
+    wait_for_text(&folder.path().join("r.rhai"), |text| {
+        text.contains("\"still\", 3, 0, 8")
+    });
+    screen.wait("a loom of 15 frames");
+    screen.press("q");
+    assert_eq!(screen.ended(), 0);
+}
+
+#[cfg(unix)]
+#[test]
+fn the_recipe_is_edited_in_the_users_editor() {
+    let folder = kitchen(OURS);
+    let editor = "printf 'load(\"bar.loom\").hold(3, 8)' >";
+    let arguments = ["open", "bar.loom", "--recipe", "r.rhai"];
+    let mut screen = Screen::open_with(folder.path(), &arguments, (120, 36), editor);
+    screen.wait("a loom of 12 frames");
+    screen.press("e");
+    screen.wait("a loom of 20 frames");
+    assert!(screen.shown.lock().unwrap().screen().alternate_screen());
+    screen.press("G");
+    screen.wait("frame 20.00/20");
+    screen.press("q");
+    assert_eq!(screen.ended(), 0);
+}
+
+#[cfg(unix)]
+#[test]
+fn what_was_in_hand_when_the_connection_was_lost_is_offered_again() {
+    let folder = kitchen(OURS);
+    let arguments = ["open", "bar.loom", "--recipe", "r.rhai"];
+    let mut screen = Screen::open(folder.path(), &arguments, (120, 36));
+    screen.wait("a loom of 12 frames");
+    screen.press("d\x1b[C");
+    screen.wait("control point ");
+    screen.signal("-HUP");
+    assert_eq!(screen.ended(), 1);
+    let file = folder.path().join("r.rhai");
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), OURS);
+    let mut screen = Screen::open(folder.path(), &arguments, (120, 36));
+    screen.wait("a lost session left gestures");
+    screen.press("y");
+    wait_for_text(&file, |text| text.contains(".move_control("));
+    screen.press("q");
+    assert_eq!(screen.ended(), 0);
 }

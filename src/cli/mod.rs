@@ -5,6 +5,7 @@
 //! stderr. Exit codes: 0 done, 1 the work failed, 2 usage.
 
 mod args;
+mod desk;
 mod interrupt;
 mod print;
 mod progress;

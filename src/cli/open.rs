@@ -5,14 +5,16 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::args::{Input, positive};
-use super::demo;
+use super::desk::{self, RecipeDesk};
+use super::recipes;
+use super::runs::Runs;
 use super::session::{Outcome, Session};
 use crate::demo::Demo;
 use crate::diag::{Diagnostic, Result, Warned};
 use crate::io::Disk;
-use crate::loom::fit::FitOptions;
 use crate::mesh::{FrameSource, Sequence};
-use crate::pipeline::{self, Content, FrameRange, InputSpec, Output};
+use crate::pipeline::{self, Content, FrameRange, Frames, InputSpec, Output};
+use crate::recipe::{self, Recipe, Request};
 use crate::task::Task;
 use crate::tui::{self, Files, Opened, Options, Protocol};
 use crate::world::World;
@@ -29,6 +31,11 @@ pub(super) struct Args {
     /// Frames a second, if the capture does not say or says wrong
     #[arg(long, value_name = "RATE", value_parser = positive)]
     fps: Option<f64>,
+
+    /// What is made of it: a recipe, run again whenever it is saved; gestures become lines of it
+    /// [default: the fit, written beside the capture with the first gesture]
+    #[arg(long, value_name = "RECIPE")]
+    recipe: Option<PathBuf>,
 
     /// How pictures are shown: kitty, iterm2, sixel, blocks, braille, ascii [default: as the terminal says it can]
     #[arg(long, value_name = "HOW", value_parser = protocol)]
@@ -47,27 +54,74 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<Outcome> {
     refuse_pipes()?;
     let spec = args.input.part.of(&args.input.inputs, args.fps);
     let name = title(&args.input.inputs);
+    let runs = Arc::new(Runs::new());
+    let loom = spec.paths.len() == 1 && pipeline::is_loom(&spec.paths[0]);
+    let recipe = match &args.recipe {
+        Some(path) => recipes::find(session.world(), path)?,
+        None => desk::beginning(&spec.paths, loom),
+    };
+    let request = request(recipe::Input::Files(spec.clone()));
+    let desk = RecipeDesk::on(Arc::clone(&runs), request, recipe, args.fps);
     let source = Source::Disk(spec);
-    studio(Shown { source, name }, args.graphics, session)
+    let shown = Shown { source, name, runs };
+    studio(shown, desk, args.graphics, session)
+}
+
+/// What runs in the studio are given. What a recipe saves is written by `meshloom run` alone, but has to
+/// have a place.
+fn request(input: recipe::Input) -> Request {
+    Request {
+        input: Some(input),
+        output: Some(PathBuf::from("meshloom-out")),
+        ..Request::default()
+    }
 }
 
 /// The studio on a built-in capture.
 pub(super) fn demo(demo: &'static Demo, session: &Session) -> Result<Outcome> {
-    let (source, name) = (Source::Demo(demo), demo.name.to_string());
-    studio(Shown { source, name }, None, session)
+    let name = demo.name.to_string();
+    let root = if demo.travels {
+        ", #{ root: \"ground\" }"
+    } else {
+        ""
+    };
+    let recipe = Recipe {
+        path: PathBuf::from(format!("{name}.rhai")),
+        text: format!("fit(demo({name:?}){root})\n"),
+    };
+    let runs = Arc::new(Runs::new());
+    let request = request(recipe::Input::Demo(name.clone()));
+    let desk = RecipeDesk::on(Arc::clone(&runs), request, recipe, None);
+    let source = Source::Demo(demo);
+    let shown = Shown { source, name, runs };
+    studio(shown, desk, None, session)
 }
 
-fn studio(shown: Shown, graphics: Option<Protocol>, session: &Session) -> Result<Outcome> {
+fn studio(
+    shown: Shown,
+    desk: RecipeDesk,
+    graphics: Option<Protocol>,
+    session: &Session,
+) -> Result<Outcome> {
     let options = options(shown.name.clone(), graphics);
     session.progress.end();
-    tui::run(&options, Arc::new(shown), &session.task)?;
+    tui::run(&options, Arc::new(shown), Arc::new(desk), &session.task)?;
     Ok(Outcome::default())
 }
 
 /// The files of a capture that is looked at.
-pub(super) fn files(spec: InputSpec, name: String) -> Arc<dyn Files> {
+pub(super) fn files(spec: InputSpec, name: String) -> tui::Shown {
+    let runs = Arc::new(Runs::new());
+    let loom = spec.paths.len() == 1 && pipeline::is_loom(&spec.paths[0]);
+    let mut recipe = desk::beginning(&spec.paths, loom);
+    if !loom && let Some(name) = recipe.path.file_name() {
+        // Not among the captures that land.
+        recipe.path = PathBuf::from(name);
+    }
+    let request = request(recipe::Input::Files(spec.clone()));
+    let desk = RecipeDesk::on(Arc::clone(&runs), request, recipe, None);
     let source = Source::Disk(spec);
-    Arc::new(Shown { source, name })
+    (Arc::new(Shown { source, name, runs }), Arc::new(desk))
 }
 
 /// Whether there is a keyboard and a screen.
@@ -112,6 +166,8 @@ pub(super) fn options(name: String, graphics: Option<Protocol>) -> Options {
 struct Shown {
     source: Source,
     name: String,
+    /// What is opened here is open for recipes.
+    runs: Arc<Runs>,
 }
 
 enum Source {
@@ -160,30 +216,27 @@ impl Files for Shown {
     }
 
     fn open(&self, task: &Task) -> Result<Warned<Opened>> {
+        let bench = self.runs.bench(task);
+        let capture = |frames: Frames| Opened::Capture((*frames.value).clone());
         let spec = match &self.source {
             Source::Disk(spec) => spec,
-            Source::Demo(demo) => {
-                let options = demo::options(demo);
-                let capture = Opened::Capture((demo.generate)(), options);
-                return Ok(Warned::clean(capture));
-            }
+            Source::Demo(demo) => return Ok(bench.demo(demo.name)?.map(capture)),
         };
-        let capture = pipeline::open(&Disk, spec, task)?;
-        let opened = match &capture.output.content {
-            Content::Sequence(sequence) => Opened::Capture(sequence.clone(), FitOptions::default()),
-            Content::Loom(_) if spec.range.is_some() => {
-                return Diagnostic::error("a range is for captures, and this is a loom")
-                    .in_file(&spec.paths[0])
-                    .hint("leave --range out, and mark a loop with [ and ]")
-                    .err();
-            }
-            Content::Loom(sampled) => {
-                let loom = sampled.loom();
-                let fps = spec.fps.or(loom.fps());
-                Opened::Loom(Arc::new(loom.with_fps(fps)?))
-            }
+        let [path] = spec.paths.as_slice() else {
+            return Ok(bench.open_frames(spec)?.map(capture));
         };
-        Ok(capture.map(|_| opened))
+        if !pipeline::is_loom(path) {
+            return Ok(bench.open_frames(spec)?.map(capture));
+        }
+        if spec.range.is_some() {
+            return Diagnostic::error("a range is for captures, and this is a loom")
+                .in_file(path)
+                .hint("leave --range out, and mark a loop with [ and ]")
+                .err();
+        }
+        let loom = bench.load(path)?.loom.value;
+        let fps = spec.fps.or(loom.fps());
+        Ok(Warned::clean(Opened::Loom(Arc::new(loom.with_fps(fps)?))))
     }
 
     fn save(&self, name: &str, png: &[u8]) -> Result<PathBuf> {

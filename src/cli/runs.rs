@@ -11,7 +11,7 @@ use serde_json::{Value as Json, json};
 
 use crate::diag::{Diagnostic, Result, Severity};
 use crate::io::{Cache, Disk};
-use crate::pipeline::{Memory, Output, Value, deliver, plan_delivery};
+use crate::pipeline::{Memory, Output, Value, Workbench, deliver, plan_delivery};
 use crate::recipe::{Failure, Input, Outcome, Param, Recipe, Request, Runner};
 use crate::script::Scripts;
 use crate::task::Task;
@@ -25,6 +25,7 @@ const CACHE: u64 = 2 << 30;
 /// Whoever runs recipes over this machine's files.
 pub(super) struct Runs {
     scripts: Scripts,
+    memory: Arc<Memory>,
 }
 
 /// What a run would do to files.
@@ -45,9 +46,16 @@ impl Runs {
     pub(super) fn new() -> Self {
         let store =
             cache_folder().map(|folder| Arc::new(Cache::new(folder, CACHE)) as Arc<dyn Store>);
+        let memory = Arc::new(Memory::new(MEMORY, store));
         Runs {
-            scripts: Scripts::new(Arc::new(Disk), Arc::new(Memory::new(MEMORY, store))),
+            scripts: Scripts::new(Arc::new(Disk), Arc::clone(&memory)),
+            memory,
         }
+    }
+
+    /// The same memory for work that is no recipe: what is opened there is open for recipes.
+    pub(super) fn bench(&self, task: &Task) -> Workbench {
+        Workbench::new(Arc::new(Disk), Arc::clone(&self.memory), task.clone())
     }
 
     /// Parses and resolves without running.

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::mpsc::{self, Sender};
 use std::thread::{self, JoinHandle};
 
@@ -14,7 +13,7 @@ use super::watch::frames_of;
 use crate::diag::{Diagnostic, Result, Severity};
 use crate::inbox::Inbox;
 use crate::pipeline::InputSpec;
-use crate::tui::{self, Files, Landing, News, Part};
+use crate::tui::{self, Landing, News, Part, Shown};
 
 /// The list on the screen, on a thread of its own.
 pub(super) struct Studio {
@@ -116,7 +115,7 @@ fn described(result: &Json) -> String {
 }
 
 /// What the studio opens of a capture.
-fn files(folder: &Path, results: &Path, landing: &Landing, part: Part) -> Arc<dyn Files> {
+fn files(folder: &Path, results: &Path, landing: &Landing, part: Part) -> Shown {
     let spec = match part {
         Part::Capture => frames_of(folder, &landing.inputs),
         Part::Results => InputSpec {

@@ -63,6 +63,8 @@ struct Log {
     steps: Vec<Step>,
     reads: BTreeSet<PathBuf>,
     bytes: usize,
+    /// Frames that were sampled, by their key, and the loom they came from.
+    sampled: Vec<(Key, LoomValue)>,
 }
 
 /// Frames that took work: what files held when they had the identities that are part of its key, a
@@ -296,7 +298,15 @@ impl Workbench {
             .memory
             .remember(key, || in_memory(&sampled, &self.task))?;
         self.note("sample", format!("{} frames", frames.frames()), made);
+        self.log().sampled.push((key, loom.clone()));
         Ok(Keyed { value: frames, key })
+    }
+
+    /// The loom that frames were sampled from in this run.
+    pub fn sampled_from(&self, frames: &Frames) -> Option<LoomValue> {
+        let log = self.log();
+        let (_, loom) = log.sampled.iter().find(|(key, _)| *key == frames.key)?;
+        Some(loom.clone())
     }
 
     /// Frames of a loom at its integers.

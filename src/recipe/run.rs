@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::Param;
 use crate::diag::{Diagnostic, Result};
-use crate::pipeline::{InputSpec, Step, Value};
+use crate::pipeline::{InputSpec, LoomValue, Step, Value};
 use crate::task::Task;
 
 /// The text of a recipe and where it came from.
@@ -52,6 +52,8 @@ pub struct Save {
 pub struct Outcome {
     /// The last value of the script.
     pub value: Value,
+    /// The loom that the value's frames were sampled from, where they were.
+    pub sampled: Option<LoomValue>,
     /// The declared parameters with their values.
     pub params: Vec<Param>,
     /// What is to be written.

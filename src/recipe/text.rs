@@ -25,6 +25,8 @@ pub struct Call {
     pub at: Range<usize>,
     /// Whether the name follows a dot.
     pub method: bool,
+    /// Of a method, where what it is called on ends; else where the name stands.
+    pub receiver: usize,
     /// Each argument without the white space around it.
     pub arguments: Vec<Range<usize>>,
     /// Just behind the closing bracket.
@@ -65,10 +67,12 @@ pub fn calls(text: &str) -> Vec<Call> {
                 if !defines && let Some((arguments, end)) = arguments(&tokens, index + 1) {
                     let method = index > 0 && mark(&tokens, index - 1) == Some(b'.');
                     let name = text[range.clone()].to_string();
+                    let before = index.checked_sub(2).filter(|_| method);
                     found.push(Call {
                         name,
                         at: range.clone(),
                         method,
+                        receiver: before.map_or(range.start, |before| tokens[before].1.end),
                         arguments,
                         end,
                         nested: depth > 0,
@@ -113,34 +117,85 @@ pub fn is_literal(text: &str, range: &Range<usize>) -> bool {
         })
 }
 
-/// The text with `.call` appended to the expression that is the recipe's result, on a line of its own,
-/// indented as the chain's other lines are. `None` when the recipe does not end in an expression.
-pub fn append_method(text: &str, call: &str) -> Option<String> {
-    let (last, range) = tokens(text).last().cloned()?;
-    if matches!(last, Token::Mark(b';' | b'}')) {
+/// The expression that a recipe ends in, and the calls `.name(..)` of its chain in order: not those within
+/// arguments.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Chain {
+    /// Where the expression stands.
+    pub range: Range<usize>,
+    /// The calls.
+    pub calls: Vec<Call>,
+}
+
+/// Words that begin something that is no chain.
+const STATEMENTS: [&str; 12] = [
+    "let", "const", "if", "for", "while", "loop", "do", "switch", "fn", "import", "return", "throw",
+];
+
+/// The chain that is the recipe's result; `None` when the recipe does not end in an expression.
+pub fn result_chain(text: &str) -> Option<Chain> {
+    let tokens = tokens(text);
+    let mut depth = 0_usize;
+    let mut first = 0;
+    for (index, (token, _)) in tokens.iter().enumerate() {
+        match token {
+            Token::Mark(b'(' | b'[' | b'{') => depth += 1,
+            Token::Mark(b')' | b']' | b'}') => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+        // A block ends a statement, a map does not: maps stand inside brackets.
+        if depth == 0 && matches!(token, Token::Mark(b';' | b'}')) {
+            first = index + 1;
+        }
+    }
+    let begin = tokens.get(first)?.1.clone();
+    if STATEMENTS.contains(&&text[begin.clone()]) {
         return None;
     }
-    let start = text[..range.end]
-        .rfind('\n')
-        .map_or(0, |newline| newline + 1);
-    let last_line = &text[start..range.end];
-    let own_indent = &last_line[..last_line.len() - last_line.trim_start().len()];
-    let indent = if last_line.trim_start().starts_with('.') {
-        own_indent.to_string()
-    } else {
-        format!("{own_indent}    ")
+    let range = begin.start..tokens.last()?.1.end;
+    let mut outer = 0_usize;
+    let mut of_chain = |call: &Call| {
+        let own = call.at.start >= range.start && call.at.start >= outer;
+        if own {
+            outer = call.end;
+        }
+        own && call.method && !call.nested
     };
-    Some(
-        [
-            &text[..range.end],
-            "\n",
-            &indent,
-            ".",
-            call,
-            &text[range.end..],
-        ]
-        .concat(),
-    )
+    let calls = calls(text)
+        .into_iter()
+        .filter(|call| of_chain(call))
+        .collect();
+    Some(Chain { range, calls })
+}
+
+/// The text with `call` (without its dot) put on a line of its own behind the part of the chain that ends
+/// at byte `end`, indented as the chain's other lines are, and the line on which it stands. A comment
+/// stays on the line that it ends.
+pub fn insert_method(text: &str, end: usize, call: &str) -> (String, usize) {
+    let start = text[..end].rfind('\n').map_or(0, |newline| newline + 1);
+    let own = indent(&text[start..end]);
+    let chained = |line: &str| line.trim_start().starts_with('.');
+    let next = text[end..].lines().nth(1).filter(|line| chained(line));
+    let indent = match next {
+        _ if chained(&text[start..end]) => own.to_string(),
+        Some(next) => indent(next).to_string(),
+        None => format!("{own}    "),
+    };
+    let rest = &text[end..];
+    let rest = &rest[..rest.find('\n').unwrap_or(rest.len())];
+    let comment = rest.trim_start().starts_with("//");
+    let at = if comment {
+        end + rest.trim_end().len()
+    } else {
+        end
+    };
+    let text = [&text[..at], "\n", &indent, ".", call, &text[at..]].concat();
+    let line = position(&text, at + 1).0;
+    (text, line)
+}
+
+fn indent(line: &str) -> &str {
+    &line[..line.len() - line.trim_start().len()]
 }
 
 /// A number as a person would write it: four digits, no trailing zeros.
@@ -367,15 +422,44 @@ mod tests {
 
     #[test]
     fn a_method_joins_the_chain_it_follows() {
-        assert_eq!(
-            append_method("fit(input())\n", "reverse()").unwrap(),
-            "fit(input())\n    .reverse()\n"
-        );
-        assert_eq!(
-            append_method("a.b()\n  .c() // end", "d()").unwrap(),
-            "a.b()\n  .c()\n  .d() // end"
-        );
-        assert_eq!(append_method("let a = 1;", "d()"), None);
+        let appended = |text: &str| {
+            let end = result_chain(text).unwrap().range.end;
+            insert_method(text, end, "d()")
+        };
+        let cases = [
+            ("fit(input())\n", "fit(input())\n    .d()\n", 2),
+            (
+                "a.b()\n  .c() // end\n",
+                "a.b()\n  .c() // end\n  .d()\n",
+                3,
+            ),
+            ("a.b()\n  .c() // end", "a.b()\n  .c() // end\n  .d()", 3),
+            ("a /* end */", "a\n    .d() /* end */", 2),
+        ];
+        for (before, after, line) in cases {
+            assert_eq!(appended(before), (after.to_string(), line));
+        }
+    }
+
+    #[test]
+    fn the_result_is_the_last_expression_and_its_own_calls() {
+        let names = |text: &str| -> Option<Vec<String>> {
+            let calls = result_chain(text)?.calls;
+            Some(calls.into_iter().map(|call| call.name).collect())
+        };
+        let text = "let a = f(1).g();\na.b(c.d(), #{ e: x.f(1) })\n .h(|t| t.k()).l[0].m()";
+        assert_eq!(names(text).unwrap(), ["b", "h", "m"]);
+        assert_eq!(names("fn f(x) { x.y() }\nf(2).z()").unwrap(), ["z"]);
+        assert_eq!(names(RECIPE), None);
+        for text in [
+            "",
+            "let a = 1",
+            "if a { b.c() }",
+            "for i in 0..3 { }",
+            "// only",
+        ] {
+            assert_eq!(names(text), None, "{text}");
+        }
     }
 
     #[test]

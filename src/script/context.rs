@@ -249,9 +249,14 @@ impl Context {
         let value = functions::value(value)?;
         let reads = self.reads();
         let steps: Vec<Step> = self.bench.steps();
+        let sampled = match &value {
+            Value::Sequence(frames) => self.bench.sampled_from(frames),
+            _ => None,
+        };
         let log = self.log();
         Ok(Outcome {
             value,
+            sampled,
             params: log.params.clone(),
             saves: log.saves.clone(),
             reads,

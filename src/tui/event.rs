@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use ratatui::crossterm::event::{KeyEvent, MouseEvent};
 
+use super::hands::{Errand, Reply};
 use super::state::{Content, Same};
 use super::thumbs::{Thumb, ThumbWish};
 use super::work::{Picture, Wish};
@@ -57,6 +58,8 @@ pub(super) enum Answer {
     Saved(PathBuf),
     /// Files could not be written.
     NotSaved(Box<Diagnostic>),
+    /// What the hands had asked for.
+    Hands(Reply),
 }
 
 /// What the studio asks for.
@@ -77,6 +80,8 @@ pub(super) enum Command {
     SavePicture(String, Wish),
     /// The shown frames to files.
     Export(super::state::Span),
+    /// What the hands ask for.
+    Hands(Errand),
     /// The terminal is cleared and drawn anew.
     Redraw,
     /// The program is stopped until it is called back.

@@ -13,6 +13,7 @@ use ratatui::crossterm::terminal::size;
 use ratatui::layout::Rect;
 use ratatui::style::Modifier;
 
+use super::hands::Desk;
 use super::studio::{Files, Options, is_dark, lost, run};
 use super::terminal;
 use super::theme::{Look, Role};
@@ -60,6 +61,9 @@ pub enum Part {
     Results,
 }
 
+/// The files of what is looked at, and the recipe that is made of it.
+pub type Shown = (Arc<dyn Files>, Arc<dyn Desk>);
+
 /// Shows what lands until it is quit. `open` gives the files of a capture or of its results; `task` is
 /// cancelled when the program is to end.
 ///
@@ -68,7 +72,7 @@ pub enum Part {
 pub fn watch(
     options: &Options,
     news: &Receiver<News>,
-    open: &dyn Fn(&Landing, Part) -> Arc<dyn Files>,
+    open: &dyn Fn(&Landing, Part) -> Shown,
     task: &Task,
 ) -> Result<()> {
     let mut list = List {
@@ -83,7 +87,8 @@ pub fn watch(
                     name: chosen.name.clone(),
                     ..options.clone()
                 };
-                run(&options, open(&chosen, part), task)?;
+                let (files, desk) = open(&chosen, part);
+                run(&options, files, desk, task)?;
             }
         }
     }

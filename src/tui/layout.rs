@@ -2,7 +2,7 @@
 
 use ratatui::layout::{Constraint, Layout, Rect};
 
-use super::panels::{DETAILS, MAP, MESH, PANELS, TIME};
+use super::panels::{DETAILS, MAP, MESH, PANELS, RECIPE, TIME};
 
 /// Below this many columns or rows panels share the screen as tabs.
 const TABS_BELOW: (u16, u16) = (100, 30);
@@ -30,9 +30,13 @@ pub(super) fn places(size: (u16, u16), focus: usize, enlarged: bool) -> Vec<(usi
     if size.0 >= ROOMY {
         let columns = [Constraint::Fill(1), Constraint::Length(56)];
         let [left, right] = Layout::horizontal(columns).areas(below);
-        places.extend([(TIME, left), (DETAILS, right)]);
+        let [upper, lower] =
+            Layout::vertical([Constraint::Fill(3), Constraint::Fill(2)]).areas(right);
+        places.extend([(TIME, left), (RECIPE, upper), (DETAILS, lower)]);
     } else {
-        places.push((TIME, below));
+        let columns = [Constraint::Fill(3), Constraint::Fill(2)];
+        let [left, right] = Layout::horizontal(columns).areas(below);
+        places.extend([(TIME, left), (RECIPE, right)]);
     }
     places
 }
@@ -105,7 +109,7 @@ mod tests {
     #[test]
     fn small_screens_show_one_panel_large_ones_all() {
         assert_eq!(places((80, 24), TIME, false).len(), 1);
-        assert_eq!(places((120, 36), TIME, false).len(), 3);
+        assert_eq!(places((120, 36), TIME, false).len(), 4);
         assert_eq!(places((240, 70), TIME, false).len(), PANELS.len());
     }
 }

@@ -12,11 +12,13 @@
 mod errors;
 mod event;
 mod graphics;
+mod hands;
 mod keys;
 mod landings;
 mod layout;
 mod panels;
 mod screen;
+mod stage;
 mod state;
 mod studio;
 mod terminal;
@@ -27,6 +29,7 @@ mod wire;
 mod work;
 
 pub use graphics::{Answers, Choice, Protocol, choose, query, read_answers};
-pub use landings::{Landing, News, Part, watch};
+pub use hands::{Desk, Kept};
+pub use landings::{Landing, News, Part, Shown, watch};
 pub use studio::{Files, Opened, Options, run};
 pub use terminal::{ask, restore};

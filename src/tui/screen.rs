@@ -116,7 +116,7 @@ fn borders(state: &State) -> Set<'static> {
 /// What a panel without a picture waits for.
 fn waiting(state: &State, index: usize) -> &'static str {
     match state.content {
-        _ if index == super::panels::DETAILS => "",
+        _ if [super::panels::DETAILS, super::panels::RECIPE].contains(&index) => "",
         _ if state.work.is_none() => "nothing to show",
         Content::Nothing | Content::FirstFrame(_) => "reading ..",
         Content::Capture(_) | Content::Loom(..) => "fitting ..",
@@ -166,6 +166,10 @@ fn draw_status(state: &State, buffer: &mut Buffer) {
             format!("{phase}{share} "),
             state.look.style(Role::Mark),
         ));
+    }
+    if let Some(held) = &state.hands.held {
+        let words = format!("{}: enter lets go, esc puts back ", held.words());
+        spans.push(Span::styled(words, state.look.style(Role::Accent)));
     }
     match &state.notice {
         Some(notice) => {
@@ -236,7 +240,12 @@ const MOUSE: &[(&str, &str)] = &[
     ("left, map", "the pose there"),
     ("left, signals", "to that time; drag to scrub"),
     ("left, mesh", "drag to turn"),
+    ("left, control", "drag a control point, or a pin"),
+    ("alt/middle, map", "drag the frame there: it is pinned"),
     ("right, map", "drag to move"),
+    ("right, signals", "drag that moment to another time"),
+    ("alt/middle, signals", "drag over the loop to mark it"),
+    ("left, recipe", "drag a slider"),
     (
         "wheel",
         "closer, farther; on the signals a frame on or back",

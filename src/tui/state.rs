@@ -5,6 +5,7 @@ use std::sync::Arc;
 use ratatui::layout::Rect;
 
 use super::graphics::CellSize;
+use super::hands::Hands;
 use super::layout;
 use super::panels::PANELS;
 use super::theme::Look;
@@ -68,6 +69,8 @@ pub(super) struct State {
     pub(super) drag: Option<Drag>,
     /// Numbers given to questions so far.
     pub(super) asked: u64,
+    /// The recipe, and what is done to it by hand.
+    pub(super) hands: Hands,
 }
 
 /// What has been read.
@@ -271,6 +274,7 @@ impl State {
             slots: PANELS.iter().map(|_| Slot::default()).collect(),
             drag: None,
             asked: 0,
+            hands: Hands::default(),
         }
     }
 

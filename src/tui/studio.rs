@@ -2,8 +2,9 @@
 
 use std::io;
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -14,9 +15,11 @@ use ratatui::layout::Rect;
 
 use super::event::{Answer, Command, Event};
 use super::graphics::{Aside, Painter, Protocol, choose, painter};
+use super::hands::{Desk, Errand, Reply, Workers};
 use super::keys::LateAnswer;
 use super::screen;
-use super::state::{Content, Same, Scene, Signals, Span, State};
+use super::stage;
+use super::state::{Content, Same, Scene, Span, State};
 use super::terminal;
 use super::theme::{Depth, Look};
 use super::thumbs::{Newest, start_thumbs};
@@ -25,9 +28,7 @@ use super::wire::write_cells;
 use super::work::{Brush, Mailbox, Wish, start, start_painter};
 use crate::diag::{Diagnostic, Result, Warned};
 use crate::loom::Loom;
-use crate::loom::fit::{FitOptions, fit};
 use crate::mesh::{Bounds, FrameSource, Sequence};
-use crate::pipeline::plot::plot_loom;
 use crate::sample::{Sampled, Sampling};
 use crate::task::{Cancelled, Observer, Task};
 
@@ -37,8 +38,6 @@ const FRAME: Duration = Duration::from_millis(33);
 const WATCH: Duration = Duration::from_millis(25);
 /// Answers of a slow terminal come no later.
 const LATEST: Duration = Duration::from_secs(10);
-/// A loom's box is taken from so many of its frames.
-const BOUNDS_SAMPLES: usize = 32;
 
 /// What the studio needs of the files. Called on worker threads.
 pub trait Files: Send + Sync {
@@ -69,8 +68,8 @@ pub trait Files: Send + Sync {
 
 /// What a file held.
 pub enum Opened {
-    /// Frames, and how they are to be fitted.
-    Capture(Sequence, FitOptions),
+    /// Frames.
+    Capture(Sequence),
     /// A loom.
     Loom(Arc<Loom>),
 }
@@ -105,7 +104,12 @@ impl Options {
 ///
 /// # Errors
 /// There is no terminal, or it is gone; cancellation.
-pub fn run(options: &Options, files: Arc<dyn Files>, task: &Task) -> Result<()> {
+pub fn run(
+    options: &Options,
+    files: Arc<dyn Files>,
+    desk: Arc<dyn Desk>,
+    task: &Task,
+) -> Result<()> {
     let screen = size().map_err(lost)?;
     terminal::take().map_err(lost)?;
     let answers = terminal::ask(options.tmux);
@@ -118,9 +122,10 @@ pub fn run(options: &Options, files: Arc<dyn Files>, task: &Task) -> Result<()> 
     let mut state = State::new(options.name.clone(), screen, choice.cell, look);
     state.plain_letters = choice.protocol == Protocol::Ascii;
     let (send, receive) = mpsc::channel();
-    let mut studio = Studio::new(state, painter(&choice, look), files, send);
+    let mut studio = Studio::new(state, painter(&choice, look), files, desk, send);
     let ended = studio.run(&receive, task);
     studio.cancel.cancel();
+    studio.hands.cancel();
     studio.forget();
     terminal::restore();
     // The keyboard is somebody else's again.
@@ -151,10 +156,46 @@ struct Studio {
     mailbox: Arc<Mailbox>,
     thumbs: Arc<Newest>,
     files: Arc<dyn Files>,
+    desk: Arc<dyn Desk>,
+    hands: Workers,
     events: Sender<Event>,
     /// Ends the work in the background.
     cancel: Task,
+    keyboard: Arc<Keyboard>,
     last_tick: Instant,
+}
+
+/// Who reads the keyboard: the studio, or a program that it has lent the terminal to.
+#[derive(Default)]
+struct Keyboard {
+    lent: AtomicBool,
+    reading: Mutex<()>,
+}
+
+impl Keyboard {
+    /// Runs `program` while nobody here reads keys.
+    fn lend<T>(&self, program: impl FnOnce() -> T) -> T {
+        self.lent.store(true, Ordering::SeqCst);
+        let reading = self.reading.lock().unwrap_or_else(PoisonError::into_inner);
+        let result = program();
+        drop(reading);
+        self.lent.store(false, Ordering::SeqCst);
+        result
+    }
+
+    /// The next event of the keyboard, if there is one soon.
+    fn read(&self) -> Option<io::Result<keyboard::Event>> {
+        if self.lent.load(Ordering::SeqCst) {
+            std::thread::sleep(WATCH);
+            return None;
+        }
+        let _reading = self.reading.lock().unwrap_or_else(PoisonError::into_inner);
+        match keyboard::poll(WATCH) {
+            Ok(false) => None,
+            Ok(true) => Some(keyboard::read()),
+            Err(error) => Some(Err(error)),
+        }
+    }
 }
 
 impl Studio {
@@ -162,8 +203,12 @@ impl Studio {
         state: State,
         painter: Box<dyn Painter>,
         files: Arc<dyn Files>,
+        desk: Arc<dyn Desk>,
         events: Sender<Event>,
     ) -> Self {
+        let cancel = Task::default();
+        let progress = Task::observed(Arc::new(Progress::new(events.clone())));
+        let hands = Workers::start(Arc::clone(&desk), &events, progress, &cancel);
         Studio {
             shown: Buffer::empty(Rect::ZERO),
             stale: true,
@@ -172,8 +217,11 @@ impl Studio {
             mailbox: Arc::default(),
             thumbs: Arc::default(),
             files,
+            desk,
+            hands,
             events,
-            cancel: Task::default(),
+            cancel,
+            keyboard: Arc::default(),
             last_tick: Instant::now(),
         }
     }
@@ -231,6 +279,8 @@ impl Studio {
             Command::DrawThumbs(number, wish) => self.thumbs.ask(number, wish),
             Command::SavePicture(name, wish) => self.save_picture(name, wish),
             Command::Export(span) => self.export(span),
+            Command::Hands(Errand::Edit) => self.edit()?,
+            Command::Hands(errand) => self.hands.carry_out(errand),
             Command::Redraw => self.stale = true,
             Command::Suspend => {
                 terminal::suspend().map_err(lost)?;
@@ -239,6 +289,21 @@ impl Studio {
             Command::Quit => return Ok(false),
         }
         Ok(true)
+    }
+
+    /// Lends the terminal to the user's editor.
+    fn edit(&mut self) -> Result<()> {
+        terminal::restore();
+        let edited = self.keyboard.lend(|| self.hands.edit());
+        terminal::take().map_err(lost)?;
+        self.stale = true;
+        if let Ok((columns, rows)) = size() {
+            self.state.size = (columns, rows);
+        }
+        let _ = self
+            .events
+            .send(Event::Answer(Answer::Hands(Reply::Edited(edited))));
+        Ok(())
     }
 
     /// Sends what has changed since the last time.
@@ -275,6 +340,7 @@ impl Studio {
     /// Keys, mouse, sizes and signals become events.
     fn listen(&self, task: &Task) {
         let (events, task, ended) = (self.events.clone(), task.clone(), self.cancel.clone());
+        let board = Arc::clone(&self.keyboard);
         start("keyboard", move || {
             let (begin, mut late) = (Instant::now(), LateAnswer::default());
             loop {
@@ -285,11 +351,7 @@ impl Studio {
                     let _ = events.send(Event::Signal);
                     return;
                 }
-                let event = match keyboard::poll(WATCH) {
-                    Ok(false) => continue,
-                    Ok(true) => keyboard::read(),
-                    Err(error) => Err(error),
-                };
+                let Some(event) = board.read() else { continue };
                 if let Ok(keyboard::Event::Key(key)) = &event
                     && begin.elapsed() < LATEST
                     && late.takes(*key)
@@ -315,12 +377,12 @@ impl Studio {
     /// Reads and fits in the background.
     fn start_opening(&mut self) {
         let (files, events) = (Arc::clone(&self.files), self.events.clone());
-        let cancel = self.cancel.clone();
+        let (desk, cancel) = (Arc::clone(&self.desk), self.cancel.clone());
         self.state.work = Some(("load", 0, 0));
         start("opening", move || {
             let progress = Arc::new(Progress::new(events.clone()));
             let task = Task::observed(progress).with_flag(cancel.flag());
-            if let Err(error) = open(&*files, &events, &task) {
+            if let Err(error) = open(&*files, &*desk, &events, &task) {
                 let _ = events.send(Event::Answer(Answer::Failed(error)));
             }
         });
@@ -377,11 +439,14 @@ fn shown_frames(content: &Content, span: Span) -> Option<Result<Box<dyn FrameSou
     }
 }
 
-/// First frame, all frames, loom: each is shown as soon as it is there.
-fn open(files: &dyn Files, events: &Sender<Event>, task: &Task) -> Result<()> {
-    let say = |content, warnings| {
-        let _ = events.send(Event::Answer(Answer::Opened(Box::new(content), warnings)));
+/// First frame, all frames, what the recipe makes of them: each is shown as soon as it is there.
+fn open(files: &dyn Files, desk: &dyn Desk, events: &Sender<Event>, task: &Task) -> Result<()> {
+    let say = |answer| {
+        let _ = events.send(Event::Answer(answer));
     };
+    let show = |content, warnings| say(Answer::Opened(Box::new(content), warnings));
+    let (recipe, saved) = desk.recipe()?;
+    say(Answer::Hands(Reply::Found(recipe, saved, desk.kept())));
     // What is wrong with the first frame is said again, with its place, by opening everything.
     if let Ok(Some(first)) = files.first(task)
         && let Some(bounds) = Bounds::of(first.frame(0))
@@ -390,55 +455,19 @@ fn open(files: &dyn Files, events: &Sender<Event>, task: &Task) -> Result<()> {
             of: Same::new(first),
             bounds,
         };
-        say(Content::FirstFrame(scene), Vec::new());
+        show(Content::FirstFrame(scene), Vec::new());
     }
     let mut warnings = Vec::new();
-    let loom = match files.open(task)?.unpack(&mut warnings) {
-        Opened::Loom(loom) => loom,
-        Opened::Capture(sequence, options) => {
-            if let Some(bounds) = box_of(&sequence)? {
-                let scene = Scene {
-                    of: Same::new(sequence.clone()),
-                    bounds,
-                };
-                say(Content::Capture(scene), std::mem::take(&mut warnings));
+    match files.open(task)?.unpack(&mut warnings) {
+        Opened::Loom(loom) => show(stage::loom(loom)?, warnings),
+        Opened::Capture(sequence) => {
+            if let Some(content) = stage::frames(sequence)? {
+                show(content, warnings);
             }
-            let fitted = fit(&sequence, &options, task)?;
-            Arc::new(fitted.unpack(&mut warnings))
         }
-    };
-    let (map, times) = plot_loom(&loom);
-    let bounds = box_of_loom(&loom)?;
-    let scene = Scene {
-        of: Same(loom),
-        bounds,
-    };
-    say(
-        Content::Loom(scene, Same::new(Signals { map, times })),
-        warnings,
-    );
-    Ok(())
-}
-
-fn box_of(frames: &dyn FrameSource) -> Result<Option<Bounds>> {
-    Bounds::of_frames(frames)
-        .map_err(|error| Diagnostic::error(format!("a frame cannot be fetched: {error}")).into())
-}
-
-/// The box around some of a loom's frames, the first and the last among them.
-fn box_of_loom(loom: &Loom) -> Result<Bounds> {
-    let n = loom.frames();
-    let count = n.min(BOUNDS_SAMPLES);
-    let mut all: Option<Bounds> = None;
-    for index in 0..count {
-        let t = 1.0 + (index * (n - 1)) as f64 / (count - 1).max(1) as f64;
-        let one = Bounds::of(&loom.at(t)?);
-        all = all.into_iter().chain(one).reduce(Bounds::join);
     }
-    Ok(all.unwrap_or(Bounds {
-        min: [0.0; 3],
-        max: [0.0; 3],
-    }))
+    say(Answer::Hands(Reply::Ready));
+    Ok(())
 }
 
 /// Tells the studio how far the work has come, not oftener than it can be seen.

@@ -6,6 +6,7 @@ use ratatui::crossterm::event::{KeyCode, KeyEvent, MouseButton, MouseEvent, Mous
 use ratatui::layout::Rect;
 
 use super::event::{Answer, Command, Event};
+use super::hands;
 use super::keys::{self, Action};
 use super::layout::{tabbed, tabs};
 use super::panels::{MAP, MESH, PANELS, TIME, map, mesh};
@@ -35,16 +36,26 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Command> {
             advance(state, passed);
             Vec::new()
         }
-        Event::Answer(answer) => {
-            on_answer(state, answer);
-            Vec::new()
-        }
-        Event::Signal => vec![Command::Quit],
+        Event::Answer(answer) => match answer {
+            Answer::Hands(reply) => hands::reply(state, reply),
+            answer => {
+                on_answer(state, answer);
+                Vec::new()
+            }
+        },
+        Event::Signal => quit(state, true),
     };
     if let (None, Content::Loom(scene, _)) = (&state.fitted, &state.content) {
         state.fitted = Some(scene.clone());
     }
     commands.extend(questions(state));
+    commands
+}
+
+/// The end; what is not saved is kept.
+fn quit(state: &State, lost: bool) -> Vec<Command> {
+    let mut commands = hands::leave(state, lost);
+    commands.push(Command::Quit);
     commands
 }
 
@@ -83,10 +94,6 @@ fn thumbs_question(state: &mut State) -> Option<Command> {
 fn on_answer(state: &mut State, answer: Answer) {
     match answer {
         Answer::Opened(content, warnings) => {
-            state.work = match *content {
-                Content::Loom(..) => None,
-                _ => state.work,
-            };
             if let Content::Capture(scene) = &*content {
                 state.capture = Some(scene.clone());
             }
@@ -120,6 +127,7 @@ fn on_answer(state: &mut State, answer: Answer) {
         }
         Answer::Saved(path) => say(state, format!("written: {}", path.display()), false),
         Answer::NotSaved(error) => say(state, error.to_string().replace("\n  ", "; "), true),
+        Answer::Hands(_) => {}
     }
 }
 
@@ -150,7 +158,10 @@ fn on_key(state: &mut State, key: KeyEvent) -> Vec<Command> {
     match state.front.take() {
         Some(Front::Help(line)) => on_help_key(state, key, line),
         Some(Front::Palette(typed, chosen)) => on_palette_key(state, key, typed, chosen),
-        None => keys::action(key).map_or_else(Vec::new, |action| act(state, action)),
+        None => match hands::key(state, key) {
+            Some(commands) => commands,
+            None => keys::action(key).map_or_else(Vec::new, |action| act(state, action)),
+        },
     }
 }
 
@@ -234,7 +245,8 @@ fn act(state: &mut State, action: Action) -> Vec<Command> {
         Action::Export => return export(state),
         Action::Redraw => return vec![Command::Redraw],
         Action::Suspend => return vec![Command::Suspend],
-        Action::Quit => return vec![Command::Quit],
+        Action::Quit => return quit(state, false),
+        by_hand => return hands::act(state, by_hand),
     }
     Vec::new()
 }
@@ -377,6 +389,9 @@ fn on_mouse(state: &mut State, mouse: MouseEvent) -> Vec<Command> {
         return Vec::new();
     }
     state.hover = Some((mouse.column, mouse.row));
+    if let Some(commands) = hands::mouse(state, mouse) {
+        return commands;
+    }
     match mouse.kind {
         MouseEventKind::Down(button) => press(state, mouse, button),
         MouseEventKind::Drag(_) => drag(state, mouse),
@@ -389,7 +404,7 @@ fn on_mouse(state: &mut State, mouse: MouseEvent) -> Vec<Command> {
 }
 
 /// The panel under the mouse, and where.
-fn under(state: &State, mouse: MouseEvent) -> Option<(usize, Rect)> {
+pub(super) fn under(state: &State, mouse: MouseEvent) -> Option<(usize, Rect)> {
     let at = (mouse.column, mouse.row).into();
     state
         .places()

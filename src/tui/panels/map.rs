@@ -3,7 +3,7 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::{MAP, Panel, cell_of, gutter, read_out};
+use super::{MAP, Panel, cell_of, gutter, hand, read_out};
 use crate::plot::Plane;
 use crate::tui::state::{Content, State};
 use crate::tui::theme::Role;
@@ -22,10 +22,11 @@ impl Panel for Map {
         let signals = state.signals()?.clone();
         let span = state.span();
         let marked = state.playback.marks.iter().any(Option::is_some) && span.from < span.to;
+        let marked = marked.then_some([span.from, span.to]);
         Some(Subject::Map {
             signals,
             window: state.window,
-            span: marked.then_some([span.from, span.to]),
+            span: hand::support(state).or(marked),
             thumbs: state.thumbs.shown.clone().filter(|_| !state.thumbs.off),
         })
     }
@@ -67,6 +68,7 @@ impl Panel for Map {
             cell.set_symbol(symbol)
                 .set_style(state.look.style(Role::Accent));
         }
+        hand::draw(state, picture, plane, area, buffer);
         let [x, y] = at;
         let place = if state.roaming.is_some() {
             "g at"

@@ -2,8 +2,10 @@
 
 mod details;
 mod gutter;
+mod hand;
 pub(super) mod map;
 pub(super) mod mesh;
+mod recipe;
 mod time;
 
 use ratatui::buffer::Buffer;
@@ -32,7 +34,13 @@ pub(super) trait Panel: Sync {
 }
 
 /// All panels, in the order of the tabs.
-pub(super) const PANELS: &[&dyn Panel] = &[&map::Map, &time::Time, &mesh::Mesh, &details::Details];
+pub(super) const PANELS: &[&dyn Panel] = &[
+    &map::Map,
+    &time::Time,
+    &mesh::Mesh,
+    &recipe::Recipe,
+    &details::Details,
+];
 
 /// Index of the map.
 pub(super) const MAP: usize = 0;
@@ -40,8 +48,10 @@ pub(super) const MAP: usize = 0;
 pub(super) const TIME: usize = 1;
 /// Index of the mesh.
 pub(super) const MESH: usize = 2;
+/// Index of the recipe.
+pub(super) const RECIPE: usize = 3;
 /// Index of the words about the loom.
-pub(super) const DETAILS: usize = 3;
+pub(super) const DETAILS: usize = 4;
 
 impl dyn Panel + '_ {
     /// The picture for `area` on the screen.

@@ -114,7 +114,7 @@ pub(super) fn screen(state: &State, protocol: Protocol) -> String {
 
 #[test]
 fn the_help_lists_every_key_on_a_large_screen() {
-    let mut state = studio((120, 50));
+    let mut state = studio((120, 90));
     press(&mut state, KeyCode::Char('?'));
     let text = screen_text(&state);
     for binding in crate::tui::keys::ACTIONS {

@@ -4,6 +4,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::{Panel, TIME, gutter, read_out};
+use crate::tui::hands::Held;
 use crate::tui::state::State;
 use crate::tui::theme::Role;
 use crate::tui::work::{Picture, Subject};
@@ -40,6 +41,13 @@ impl Panel for Time {
                     }
                 });
             }
+        }
+        if let Some(Held::Moment(moment)) = &state.hands.held {
+            upright(picture, moment.time(), area, |x, y| {
+                if let Some(cell) = buffer.cell_mut((x, y)) {
+                    cell.set_symbol("┃").set_style(state.look.style(Role::Mark));
+                }
+            });
         }
         upright(picture, state.playback.t, area, |x, y| {
             if let Some(cell) = buffer.cell_mut((x, y)) {
