@@ -34,6 +34,7 @@ pub mod metric;
 pub mod sample;
 pub mod signal;
 pub mod space;
+pub mod statistics;
 
 pub mod demo;
 pub mod format;

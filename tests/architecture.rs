@@ -17,7 +17,7 @@ const MAP: &[(&str, &str)] = &[
     ("signal", "task math"),
     ("loom", "diag task math mesh space signal"),
     ("inbetween", "diag task math mesh space"),
-    ("statistics", "diag task math mesh space"),
+    ("statistics", "diag task math mesh space inbetween"),
     ("metric", "task math mesh"),
     ("edit", "diag task math mesh space signal loom"),
     ("sample", "diag task mesh loom"),

@@ -29,6 +29,7 @@ mod open;
 mod plot;
 mod run;
 mod sample;
+mod stats;
 mod transfer;
 mod watch;
 mod watched;
@@ -69,6 +70,7 @@ commands! {
     transfer Transfer,
     complete Complete,
     morph Morph,
+    stats Stats,
     open Open,
     run Run,
     watch Watch,

@@ -10,7 +10,7 @@
 //!    turn against the parent. Such a relative turn is small, so there is no doubt about its branch, even
 //!    where the whole turns around several times; and which triangle is the root makes no difference.
 //! 2. Each triangle gets the shape of its interpolated lengths. Turned and shaped, the triangles fit
-//!    together along the tree only; positions follow by the Poisson system ([`Poisson`]).
+//!    together along the tree only; positions follow by the Poisson system ([`crate::mesh::Poisson`]).
 //! 3. [`FITS`] times: each triangle of interpolated lengths is laid onto the one that was found, and
 //!    positions are solved for again. Each brings edges nearer to their lengths.
 //!
@@ -23,14 +23,14 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
-use super::polygon::{Polygon, apex, is_polygon, normal, perpendicular, point, put, side_lengths};
+use super::fitting::{Fitting, Target};
+use super::polygon::{Polygon, is_polygon, normal, point, put, side_lengths};
 use crate::math::direction;
 use crate::math::rotation::{exp, log};
 use crate::math::sparse::SparseError;
 use crate::mesh::rigid_align::{mean, rigid};
 use crate::mesh::{
-    Cost, DualTree, Hinges, Poisson, PoissonAnalysis, ReferenceTriangle, Topology, dual_trees,
-    reference_triangles,
+    Cost, DualTree, Hinges, NO_EDGE, PoissonAnalysis, Topology, dual_trees, reference_triangles,
 };
 
 /// How often triangles are laid onto what was found and positions solved for again: on ten poses of a
@@ -54,10 +54,10 @@ const SAME_TURN: f64 = 1e-8;
 pub struct Connectivity {
     /// Triangles, each beginning at its corner of smallest x, then y, then z in a given pose, so that
     /// how a file turns a triangle does not show.
-    triangles: Vec<[u32; 3]>,
-    hinges: Arc<Hinges>,
-    analysis: Arc<PoissonAnalysis>,
-    members: Vec<Vec<u32>>,
+    pub(super) triangles: Vec<[u32; 3]>,
+    pub(super) hinges: Arc<Hinges>,
+    pub(super) analysis: Arc<PoissonAnalysis>,
+    pub(super) members: Vec<Vec<u32>>,
 }
 
 impl Connectivity {
@@ -84,6 +84,22 @@ impl Connectivity {
             analysis,
             members,
         })
+    }
+}
+
+impl Connectivity {
+    /// The edges of the triangles, the diagonals that cut polygons among them: the smaller vertex first,
+    /// in ascending order.
+    pub fn edges(&self) -> &[[u32; 2]] {
+        self.hinges.edges()
+    }
+
+    /// The three edges of each triangle of the mesh, by their places in [`Connectivity::edges`]; none for
+    /// a side from a vertex to itself.
+    pub fn sides(&self) -> impl Iterator<Item = [Option<usize>; 3]> {
+        let edge = |edge: u32| (edge != NO_EDGE).then_some(edge as usize);
+        let sides = self.hinges.side_edges().as_chunks::<3>().0.iter();
+        sides.map(move |sides| sides.map(edge))
     }
 }
 
@@ -149,8 +165,7 @@ impl Path {
 /// The triangles of parts that are no polygons.
 #[derive(Debug)]
 struct Mesh {
-    triangles: Vec<[u32; 3]>,
-    poisson: Poisson,
+    fitting: Fitting,
     trees: Vec<DualTree>,
     /// The turn of each triangle in the first pose against the reference: none but where that has no
     /// plane.
@@ -322,7 +337,7 @@ fn unmoved(positions: &[f64], motion: &Isometry3<f64>) -> Vec<f64> {
         .collect()
 }
 
-fn gathered(positions: &[f64], members: &[u32]) -> Vec<f64> {
+pub(super) fn gathered(positions: &[f64], members: &[u32]) -> Vec<f64> {
     let points = members.iter().map(|&vertex| point(positions, vertex));
     points.flat_map(|p| p.data.0[0]).collect()
 }
@@ -426,7 +441,6 @@ impl Mesh {
         poses: &[Vec<f64>; 2],
     ) -> Result<Self, SparseError> {
         let triangles = &connectivity.triangles;
-        let reference = reference_triangles(triangles, &poses[0]);
         let (rest, turned) = between(triangles, [&poses[0], &poses[1]]);
         let mut turns: Vec<_> = turned.iter().map(log).collect();
         for step in trees.iter().flat_map(|tree| &tree.steps) {
@@ -438,8 +452,7 @@ impl Mesh {
             all.map(|&corners| side_lengths(pose, corners)).collect()
         };
         Ok(Mesh {
-            poisson: Poisson::new(Arc::clone(&connectivity.analysis), reference)?,
-            triangles: triangles.clone(),
+            fitting: Fitting::new(connectivity, &poses[0])?,
             trees,
             rest,
             turns,
@@ -449,38 +462,17 @@ impl Mesh {
 
     /// The shape at `t`, up to a rigid motion of each part.
     fn at(&self, t: f64, positions: &mut [f64]) {
-        let targets = self.targets(t);
-        let turns = self.turns_at(t);
-        let reference = self.poisson.reference();
-        self.poisson.solve(
-            |face| targets[face].turned(&reference[face], &turns[face]),
-            positions,
-        );
+        let [from, to] = &self.sides;
+        let blend = |(a, b): (&[f64; 3], &[f64; 3])| {
+            Target::new(std::array::from_fn(|k| a[k] * (1.0 - t) + b[k] * t))
+        };
+        let targets: Vec<Target> = from.iter().zip(to).map(blend).collect();
+        self.fitting.turned(&targets, &self.turns_at(t), positions);
         let mut found = vec![0.0; positions.len()];
         for _ in 0..FITS {
             found.copy_from_slice(positions);
-            self.poisson.solve(
-                |face| {
-                    let corners = self.triangles[face].map(|vertex| point(&found, vertex));
-                    targets[face].laid_onto(&reference[face], corners)
-                },
-                positions,
-            );
+            self.fitting.fit(&targets, &found, positions);
         }
-    }
-
-    fn targets(&self, t: f64) -> Vec<Target> {
-        let [from, to] = &self.sides;
-        let blend = |(a, b): (&[f64; 3], &[f64; 3])| {
-            let lengths: [f64; 3] = std::array::from_fn(|side| a[side] * (1.0 - t) + b[side] * t);
-            let [offset, height] = apex(lengths);
-            Target {
-                length: lengths[0],
-                offset,
-                height,
-            }
-        };
-        from.iter().zip(to).map(blend).collect()
     }
 
     /// The turn of each triangle against its reference.
@@ -494,76 +486,6 @@ impl Mesh {
             *turn *= rest;
         }
         turns
-    }
-}
-
-/// A triangle of given lengths in a plane of its own: corner 1 at (length, 0), corner 2 at
-/// (offset, height).
-#[derive(Debug, Clone, Copy)]
-struct Target {
-    length: f64,
-    offset: f64,
-    height: f64,
-}
-
-/// Below this ratio of area to squared sides a triangle counts as a line.
-const FLAT: f64 = 1e-12;
-
-impl Target {
-    /// Where its gradient takes the reference's basis when `turn` is the rotation in its polar factors.
-    fn turned(&self, rest: &ReferenceTriangle, turn: &UnitQuaternion<f64>) -> [Vector3<f64>; 2] {
-        // the gradient in the two planes is (a, b; 0, d); the rotation nearest it turns by -(sine, cosine)
-        let a = self.length / rest.length;
-        let b = (self.offset - rest.offset * a) / rest.height;
-        let d = self.height / rest.height;
-        let size = ((a + d) * (a + d) + b * b).sqrt();
-        let (cosine, sine) = match size > 0.0 {
-            true => ((a + d) / size, b / size),
-            false => (1.0, 0.0),
-        };
-        let (u, v) = (turn * rest.along, turn * rest.across());
-        let along = u * cosine + v * sine;
-        let across = v * cosine - u * sine;
-        self.images(rest, &along, &across)
-    }
-
-    /// The same when the triangle is laid onto one with these corners as well as it can be: of all turns
-    /// in its plane the one that brings the gradients nearest, of a triangle that is a line its sides.
-    fn laid_onto(
-        &self,
-        rest: &ReferenceTriangle,
-        [p, q, r]: [Vector3<f64>; 3],
-    ) -> [Vector3<f64>; 2] {
-        let (e1, e2) = (q - p, r - p);
-        let cross = e1.cross(&e2);
-        let flat = cross.norm() <= FLAT * (e1.norm_squared() + e2.norm_squared());
-        let normal = match flat {
-            true => perpendicular(&(e1 + e2)),
-            false => cross.normalize(),
-        };
-        let (l, x, y) = (self.length, self.offset, self.height);
-        let along = if l * y > FLAT * (l * l + x * x + y * y) {
-            // both gradients times twice the area
-            e1 * y - normal.cross(&(e2 * l - e1 * x))
-        } else {
-            e1 * l + e2 * x - normal.cross(&e2) * y
-        };
-        let along = along.try_normalize(0.0);
-        let along = along.unwrap_or_else(|| perpendicular(&normal));
-        self.images(rest, &along, &normal.cross(&along))
-    }
-
-    fn images(
-        &self,
-        rest: &ReferenceTriangle,
-        along: &Vector3<f64>,
-        across: &Vector3<f64>,
-    ) -> [Vector3<f64>; 2] {
-        let (e1, e2) = (
-            along * self.length,
-            along * self.offset + across * self.height,
-        );
-        rest.images(&e1, &e2)
     }
 }
 

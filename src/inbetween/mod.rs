@@ -5,6 +5,7 @@
 
 pub mod complete;
 mod drift;
+mod fitting;
 pub mod ghost;
 pub mod isometric;
 pub mod keys;
@@ -13,6 +14,7 @@ pub mod polygon;
 pub mod skeleton;
 
 pub use complete::{Boundary, CompleteOptions, Velocity, complete};
+pub use fitting::Layout;
 pub use ghost::{GHOST_FACES, GhostOptions, GhostReport, GhostSize, Lift};
 pub use keys::{Keys, SPACING};
 pub use motion::{Motion, MotionFrames, MotionReport};

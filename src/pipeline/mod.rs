@@ -22,6 +22,7 @@ mod request;
 mod save;
 mod sheet;
 mod spaces;
+mod statistics;
 mod transfer;
 mod value;
 mod workbench;
@@ -47,8 +48,13 @@ pub use request::FitRequest;
 pub use save::{Saved, save};
 pub use sheet::contact_sheet;
 pub use spaces::{SpaceReport, best_space, compare_spaces};
+pub use statistics::{
+    SAMPLES, Statistics, StatisticsReport, StatisticsRequest, add_difference, statistics,
+};
 pub use transfer::open_examples;
-pub use value::{Frames, Keyed, LoomValue, Picture, Shape, ShapeValue, Source, Value};
+pub use value::{
+    Frames, Keyed, LoomValue, Picture, Shape, ShapeValue, Source, StatisticsValue, Value,
+};
 pub use workbench::{Step, Workbench};
 
 pub use crate::edit::transfer::Examples;

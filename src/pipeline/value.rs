@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::key::{Key, KeyBuilder};
 use super::memory::Remembered;
 use super::request::FitRequest;
+use super::statistics::Statistics;
 use crate::edit::Edit;
 use crate::format;
 use crate::loom::Loom;
@@ -48,6 +49,9 @@ pub type Frames = Keyed<Sequence>;
 
 /// One mesh.
 pub type ShapeValue = Keyed<Shape>;
+
+/// Poses, their mean and their principal components.
+pub type StatisticsValue = Keyed<Statistics>;
 
 impl Frames {
     /// How many frames there are.
@@ -206,6 +210,12 @@ impl Value {
 impl Remembered for Sequence {
     fn size(&self) -> usize {
         4 * self.positions().len()
+    }
+}
+
+impl Remembered for Statistics {
+    fn size(&self) -> usize {
+        self.bytes()
     }
 }
 

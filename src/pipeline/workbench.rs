@@ -13,8 +13,9 @@ use super::memory::{Made, Memory, Remembered};
 use super::request::FitRequest;
 use super::value::{Frames, Keyed, LoomValue, Picture, Shape, ShapeValue, Source, content_key};
 use super::{
-    CompleteRequest, InputSpec, MorphRequest, PictureFormat, complete, contact_sheet, files, morph,
-    morph_frames, open, open_loom, plot,
+    CompleteRequest, InputSpec, MorphRequest, PictureFormat, StatisticsRequest, StatisticsValue,
+    add_difference, complete, contact_sheet, files, morph, morph_frames, open, open_loom, plot,
+    statistics,
 };
 use crate::demo::Demo;
 use crate::diag::{Diagnostic, Result, Warned};
@@ -461,6 +462,81 @@ impl Workbench {
         Ok(Warned {
             output: Keyed::new(found.sequence.clone(), key),
             warnings: found.warnings.clone(),
+        })
+    }
+
+    /// Mean and principal components of poses.
+    ///
+    /// # Errors
+    /// As [`statistics`].
+    pub fn statistics(
+        &self,
+        poses: &Frames,
+        request: &StatisticsRequest,
+    ) -> Result<StatisticsValue> {
+        let key = poses
+            .then("statistics")
+            .text(&format!("{request:?}"))
+            .finish();
+        let compute = || statistics(&poses.value, request, &self.task);
+        let (value, made) = self.memory.remember(key, compute)?;
+        self.note("statistics", format!("{} poses", poses.frames()), made);
+        Ok(Keyed { value, key })
+    }
+
+    /// The mean of poses.
+    ///
+    /// # Errors
+    /// None that finite poses can cause.
+    pub fn mean_shape(&self, found: &StatisticsValue) -> Result<Warned<ShapeValue>> {
+        self.keyed_shape(found.value.mean()?, found.then("mean").finish())
+    }
+
+    /// The shape so many standard deviations along a mode, from 1.
+    ///
+    /// # Errors
+    /// There is no such mode.
+    pub fn sample_mode(
+        &self,
+        found: &StatisticsValue,
+        mode: usize,
+        sigmas: f64,
+    ) -> Result<Warned<ShapeValue>> {
+        let key = found.then("mode").number(mode as f64).number(sigmas);
+        self.keyed_shape(found.value.sample(mode, sigmas)?, key.finish())
+    }
+
+    /// A pose with the difference between two others added: pose, from, to.
+    ///
+    /// # Errors
+    /// As [`add_difference`]; the meshes differ.
+    pub fn add_difference(
+        &self,
+        shapes: &[ShapeValue; 3],
+        space: &str,
+    ) -> Result<Warned<ShapeValue>> {
+        let joined = self.gather(shapes)?;
+        let key = joined.then("add_difference").text(space).finish();
+        self.keyed_shape(add_difference(&joined.value, space)?, key)
+    }
+
+    fn keyed_shape(&self, shape: Warned<Shape>, key: Key) -> Result<Warned<ShapeValue>> {
+        self.charge(4 * shape.output.positions.len())?;
+        Ok(Warned {
+            output: Keyed::new(shape.output, key),
+            warnings: shape.warnings,
+        })
+    }
+
+    /// Poses by their first two modes, as a file that ends like `path`.
+    ///
+    /// # Errors
+    /// The ending names no picture.
+    pub fn plot_statistics(&self, found: &StatisticsValue, path: &str) -> Result<Picture> {
+        let format = PictureFormat::of(Path::new(path))?;
+        let scene = found.value.figure(&[], &Theme::light());
+        Ok(Picture {
+            bytes: format.encode(&scene, 2.0)?,
         })
     }
 

@@ -12,6 +12,7 @@ mod pose;
 mod poses;
 mod shape;
 mod sources;
+mod statistics;
 mod time;
 
 use rhai::{Array, Dynamic, Engine};
@@ -20,7 +21,9 @@ pub(super) use params::written_param;
 
 use super::context::Context;
 use crate::diag::{Diagnostic, Result};
-use crate::pipeline::{Examples, Frames, Keyed, LoomValue, Picture, ShapeValue, Value};
+use crate::pipeline::{
+    Examples, Frames, Keyed, LoomValue, Picture, ShapeValue, StatisticsValue, Value,
+};
 use std::sync::Arc;
 
 /// Makes all functions and types known to `engine`.
@@ -31,6 +34,7 @@ pub(super) fn register(engine: &mut Engine) {
     engine.register_type_with_name::<time::Clock>("Clock");
     engine.register_type_with_name::<Keyed<Examples>>("Examples");
     engine.register_type_with_name::<Arc<Picture>>("Image");
+    engine.register_type_with_name::<StatisticsValue>("Statistics");
     params::register(engine);
     sources::register(engine);
     time::register(engine);
@@ -39,6 +43,7 @@ pub(super) fn register(engine: &mut Engine) {
     shape::register(engine);
     keys::register(engine);
     morph::register(engine);
+    statistics::register(engine);
     output::register(engine);
 }
 
@@ -97,6 +102,10 @@ pub(super) fn value(result: Dynamic) -> Result<Value> {
             .hint("`loom.transfer(examples(sources, targets))` takes them")
             .err();
     }
+    let result = match result.try_cast_result::<StatisticsValue>() {
+        Ok(found) => return Ok(Value::Text(found.value.to_string())),
+        Err(result) => result,
+    };
     if result.is::<time::Clock>() {
         return Diagnostic::error("the recipe ends in times without a loom")
             .hint("`loom.resample(fps(60))` takes them")

@@ -88,9 +88,10 @@ mod functions {
         pass(Context::of(&call)?.save(value, path))
     }
 
-    /// Draws pose space and time signals of a loom, and writes them below `-o`.
+    /// Draws pose space and time signals of a loom, or poses by their principal components, and writes
+    /// them below `-o`.
     ///
-    /// `plot(loom, path)`
+    /// `plot(loom, path)`, `plot(pca, path)`
     ///
     /// The path ends in `.png` or `.svg`.
     ///

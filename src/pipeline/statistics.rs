@@ -1,0 +1,388 @@
+//! Statistics of poses: mean, principal components, expression transfer, and their picture.
+
+use std::sync::Arc;
+
+use serde::Serialize;
+
+use super::value::Shape;
+use crate::diag::{Diagnostic, Result, Warned};
+use crate::mesh::{Edges, FrameSource, Sequence, Topology};
+use crate::plot::{Group, Scatter, Scene, Spectrum, Theme, Tint, scatter, spectrum};
+use crate::space::SPACES;
+use crate::statistics::{EDGE_LENGTHS, Ground, Population, aligned, scale_free};
+use crate::task::Task;
+
+/// What is asked of statistics.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StatisticsRequest {
+    /// The shape space's name, or `edge-lengths`.
+    pub space: String,
+    /// Whether size is no difference of shape.
+    pub scale_free: bool,
+}
+
+impl Default for StatisticsRequest {
+    fn default() -> Self {
+        StatisticsRequest {
+            space: "gradients".to_string(),
+            scale_free: false,
+        }
+    }
+}
+
+/// Poses of one mesh, their mean and the directions in which they differ most.
+pub struct Statistics {
+    topology: Arc<Topology>,
+    poses: Vec<Vec<f64>>,
+    ground: Ground,
+    population: Population,
+    request: StatisticsRequest,
+}
+
+/// What was found, as the command line's JSON has it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StatisticsReport {
+    /// How many poses there are.
+    pub poses: usize,
+    /// The shape space's name, or `edge-lengths`.
+    pub space: String,
+    /// How many coordinates a shape has.
+    pub dimension: usize,
+    /// Whether size was taken off.
+    pub scale_free: bool,
+    /// The share of each mode in the variance, largest first; together 1.
+    pub explained: Vec<f64>,
+    /// The standard deviation along each mode, in units of the space.
+    pub sigmas: Vec<f64>,
+    /// Where each pose lies along each mode, from the mean.
+    pub coordinates: Vec<Vec<f64>>,
+}
+
+/// Samples along a mode: from -2 to 2 standard deviations in steps of a half.
+pub const SAMPLES: usize = 9;
+
+/// Size of the figure, in units.
+const FIGURE: [f32; 2] = [1200.0, 620.0];
+
+/// The part of its width that the scatter plot takes.
+const SCATTER: f32 = 0.66;
+
+/// Analyses the frames of `poses`, aligned rigidly.
+///
+/// # Errors
+/// Fewer than two poses, an unknown space, a mesh that the space does not suit, cancellation.
+pub fn statistics(
+    poses: &Sequence,
+    request: &StatisticsRequest,
+    task: &Task,
+) -> Result<Statistics> {
+    let n = poses.frames();
+    if n < 2 {
+        return Diagnostic::error(format!("statistics need two poses, here is {n}"))
+            .hint("name several meshes, or a folder or file that holds several frames")
+            .err();
+    }
+    known(&request.space)?;
+    task.phase("statistics", n);
+    let topology = Arc::clone(poses.topology());
+    let mut shapes: Vec<Vec<f64>> = (0..n).map(|pose| doubles(poses.frame(pose))).collect();
+    if request.scale_free {
+        shapes = scale_free(&shapes, Edges::new(&topology).ends());
+    }
+    let shapes = aligned(&shapes);
+    let ground = Ground::open(&request.space, &topology, &shapes)?;
+    let population = Population::new(&ground, &shapes, task)?;
+    Ok(Statistics {
+        topology,
+        poses: shapes,
+        ground,
+        population,
+        request: request.clone(),
+    })
+}
+
+/// Refuses the name of no space.
+fn known(space: &str) -> Result<()> {
+    let names = SPACES.iter().map(|kind| kind.name).chain([EDGE_LENGTHS]);
+    let names: Vec<&str> = names.collect();
+    match names.contains(&space) {
+        true => Ok(()),
+        false => Diagnostic::error(format!("there is no space `{space}`"))
+            .hint(format!("there are {}", names.join(", ")))
+            .err(),
+    }
+}
+
+impl Statistics {
+    /// How many modes there are: at most the poses but one.
+    pub fn modes(&self) -> usize {
+        self.population.modes()
+    }
+
+    /// Bytes that it holds.
+    pub(super) fn bytes(&self) -> usize {
+        let d = self.ground.dimension();
+        8 * (d * (self.modes() + 1) + self.poses.len() * 3 * self.topology.vertices())
+    }
+
+    /// What was found.
+    pub fn report(&self) -> StatisticsReport {
+        let coordinates =
+            (0..self.poses.len()).map(|pose| self.population.coordinates(pose).to_vec());
+        StatisticsReport {
+            poses: self.poses.len(),
+            space: self.request.space.clone(),
+            dimension: self.ground.dimension(),
+            scale_free: self.request.scale_free,
+            explained: self.population.explained().to_vec(),
+            sigmas: self.population.sigmas().to_vec(),
+            coordinates: coordinates.collect(),
+        }
+    }
+
+    /// The mean shape; it lies where the first pose lies.
+    ///
+    /// # Errors
+    /// None that finite poses can cause.
+    pub fn mean(&self) -> Result<Warned<Shape>> {
+        self.shape(&self.population.along(0, 0.0))
+    }
+
+    /// The shape `sigmas` standard deviations along a mode, counted from 1.
+    ///
+    /// # Errors
+    /// There is no such mode.
+    pub fn sample(&self, mode: usize, sigmas: f64) -> Result<Warned<Shape>> {
+        if mode == 0 || mode > self.modes() {
+            return Diagnostic::error(format!(
+                "there is no mode {mode}: {} poses",
+                self.poses.len()
+            ))
+            .hint(format!("choose within 1:{}", self.modes()))
+            .err();
+        }
+        self.shape(&self.population.along(mode - 1, sigmas))
+    }
+
+    /// [`SAMPLES`] shapes along a mode, counted from 1, from -2 to 2 standard deviations.
+    ///
+    /// # Errors
+    /// There is no such mode; cancellation.
+    pub fn along(&self, mode: usize, task: &Task) -> Result<Warned<Sequence>> {
+        let (mut positions, mut warnings) = (Vec::new(), Vec::new());
+        for step in 0..SAMPLES {
+            task.check()?;
+            let sigmas = step as f64 * 4.0 / (SAMPLES - 1) as f64 - 2.0;
+            let mut told = Vec::new();
+            positions.extend(self.sample(mode, sigmas)?.unpack(&mut told).positions);
+            warnings.extend(told.into_iter().map(|warning| Diagnostic {
+                message: format!("{sigmas} sigma along mode {mode}: {}", warning.message),
+                ..warning
+            }));
+        }
+        Ok(Warned {
+            output: Sequence::new(Arc::clone(&self.topology), positions, None),
+            warnings,
+        })
+    }
+
+    fn shape(&self, code: &[f64]) -> Result<Warned<Shape>> {
+        // lengths start from the pose whose own are nearest
+        let distance = |pose: &Vec<f64>| -> f64 {
+            let pairs = self.ground.encode(pose).into_iter().zip(code);
+            pairs.map(|(a, b)| (a - b) * (a - b)).sum()
+        };
+        let nearest = self
+            .poses
+            .iter()
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        let near = nearest.map_or(&[][..], Vec::as_slice);
+        let positions = self.ground.decode(code, near)?;
+        Ok(Warned {
+            output: shape(&self.topology, &positions),
+            warnings: broken(&self.ground, code).into_iter().collect(),
+        })
+    }
+
+    /// The poses by their first two modes, with their names, and the shares of all modes.
+    pub fn figure(&self, names: &[String], theme: &Theme) -> Scene {
+        let [width, height] = FIGURE;
+        let shares = self.population.explained();
+        let axis = |mode: usize| match shares.get(mode) {
+            Some(share) => format!("mode {} ({:.0} %)", mode + 1, 100.0 * share),
+            None => String::new(),
+        };
+        let place = |pose: usize| {
+            let along = self.population.coordinates(pose);
+            let at = |mode: usize| along.get(mode).copied().unwrap_or(0.0);
+            let name = names.get(pose).cloned();
+            (
+                [at(0), at(1)],
+                name.unwrap_or_else(|| (pose + 1).to_string()),
+            )
+        };
+        let points = Scatter {
+            x: axis(0),
+            y: axis(1),
+            groups: vec![
+                Group {
+                    name: "mean".into(),
+                    tint: Tint::Muted,
+                    points: vec![([0.0, 0.0], String::new())],
+                },
+                Group {
+                    name: "poses".into(),
+                    tint: Tint::Series(0),
+                    points: (0..self.poses.len()).map(place).collect(),
+                },
+            ],
+        };
+        let shares = Spectrum {
+            values: shares.iter().map(|share| 100.0 * share).collect(),
+            kept: shares.len(),
+            name: "share of the variance, %".into(),
+        };
+        let first = (SCATTER * width).round();
+        let mut scene = Scene::new(width, height, theme.background);
+        scene.place(scatter(&points, first, height, theme).0, [0.0, 0.0]);
+        let rest = spectrum(&shares, width - first, height, theme).0;
+        scene.place(rest, [first, 0.0]);
+        scene
+    }
+}
+
+/// For people: how many poses, and the shares of the first modes.
+impl std::fmt::Display for Statistics {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let shares = self.population.explained().iter().take(5);
+        let shares: Vec<String> = shares
+            .map(|share| format!("{:.1} %", 100.0 * share))
+            .collect();
+        write!(
+            f,
+            "{} poses; variance by mode {}",
+            self.poses.len(),
+            shares.join(", ")
+        )
+    }
+}
+
+/// The shape that `pose` becomes when the difference between two other shapes of the mesh is added to
+/// it; it lies where `pose` lies. The three are the frames of `shapes`: pose, from, to.
+///
+/// # Errors
+/// Not three shapes; as [`statistics`].
+pub fn add_difference(shapes: &Sequence, space: &str) -> Result<Warned<Shape>> {
+    if shapes.frames() != 3 {
+        return Diagnostic::error("a difference is added to one shape and taken between two")
+            .hint("`add_difference(pose, from, to)` takes three meshes")
+            .err();
+    }
+    known(space)?;
+    let shapes_of = |frame| doubles(shapes.frame(frame));
+    let poses = aligned(&[shapes_of(0), shapes_of(1), shapes_of(2)]);
+    // the difference between the two is none of place: each lies nearest the other
+    let pair = aligned(&poses[1..]);
+    let topology = shapes.topology();
+    let ground = Ground::open(
+        space,
+        topology,
+        &[poses[0].clone(), pair[0].clone(), pair[1].clone()],
+    )?;
+    let code = ground.moved(&poses[0], &pair[0], &pair[1]);
+    let positions = ground.decode(&code, &poses[0])?;
+    Ok(Warned {
+        output: shape(topology, &positions),
+        warnings: broken(&ground, &code).into_iter().collect(),
+    })
+}
+
+/// What is said of lengths that are those of no triangle.
+fn broken(ground: &Ground, code: &[f64]) -> Option<Diagnostic> {
+    let face = ground.broken(code)?;
+    Some(
+        Diagnostic::warning("edge lengths that no triangle has: it becomes a line")
+            .at_face(face + 1)
+            .hint("go less far from the mean, or use a shape space"),
+    )
+}
+
+fn shape(topology: &Arc<Topology>, positions: &[f64]) -> Shape {
+    Shape {
+        topology: Arc::clone(topology),
+        positions: positions.iter().map(|&x| x as f32).collect(),
+    }
+}
+
+fn doubles(row: &[f32]) -> Vec<f64> {
+    row.iter().map(|&x| f64::from(x)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::demo::Demo;
+    use crate::plot::Item;
+
+    fn cactus() -> Sequence {
+        (Demo::find("cactus").unwrap().generate)()
+    }
+
+    fn found(space: &str) -> Statistics {
+        let request = StatisticsRequest {
+            space: space.into(),
+            ..StatisticsRequest::default()
+        };
+        statistics(&cactus(), &request, &Task::default()).unwrap()
+    }
+
+    #[test]
+    fn the_figure_has_a_point_and_a_name_for_each_pose() {
+        let names = ["left", "front", "right"].map(String::from);
+        let scene = found("gradients").figure(&names, &Theme::light());
+        for name in &names {
+            let told = |item: &&Item| matches!(item, Item::Text(label) if label.text == *name);
+            assert_eq!(scene.items.iter().filter(told).count(), 1, "{name}");
+        }
+    }
+
+    #[test]
+    fn modes_are_counted_from_one_and_sampled_about_the_mean() {
+        let found = found("vertices");
+        assert_eq!(found.modes(), 2);
+        let line = found.along(1, &Task::default()).unwrap().output;
+        let mean = found.mean().unwrap().output;
+        assert_eq!(line.frames(), SAMPLES);
+        let apart = line.frame(4).iter().zip(&mean.positions);
+        assert!(apart.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max) == 0.0);
+        assert!(found.sample(0, 1.0).is_err() && found.sample(3, 1.0).is_err());
+    }
+
+    #[test]
+    fn an_unknown_space_is_told_with_the_others() {
+        let request = StatisticsRequest {
+            space: "angles".into(),
+            ..StatisticsRequest::default()
+        };
+        let error = statistics(&cactus(), &request, &Task::default())
+            .err()
+            .unwrap();
+        assert!(error.hints[0].contains("vertices") && error.hints[0].contains(EDGE_LENGTHS));
+        let one = cactus().slice(0..1);
+        assert!(statistics(&one, &StatisticsRequest::default(), &Task::default()).is_err());
+    }
+
+    #[test]
+    fn a_difference_leads_from_one_pose_to_the_other() {
+        let all = cactus();
+        let frames = [0, 0, 2]
+            .iter()
+            .flat_map(|&frame| all.frame(frame).to_vec());
+        let three = Sequence::new(Arc::clone(all.topology()), frames.collect(), None);
+        let moved = add_difference(&three, "gradients").unwrap().output;
+        let (from, to) = (doubles(all.frame(2)), doubles(&moved.positions));
+        // f32 positions of a cactus about a metre high
+        assert!(crate::statistics::aligned_rms(&from, &to) < 1e-5);
+        assert!(add_difference(&all.slice(0..2), "gradients").is_err());
+    }
+}
