@@ -179,3 +179,75 @@ fn what_is_no_skeleton_is_named() {
         "{warning}"
     );
 }
+
+#[test]
+fn a_spline_goes_through_all_poses_in_a_space() {
+    let folder = tempdir().unwrap();
+    sheet(5, 3).write_objs(&folder.path().join("poses"));
+    for space in ["", "--space gradients"] {
+        let args = format!("morph poses -o s.pc2 --method spline {space} --frames 5 --json");
+        let object = meshloom(folder.path(), &args).done().object();
+        assert_eq!(object["report"]["method"], "spline");
+        assert!(object["report"].get("alignment").is_none());
+    }
+    let refused = |args: &str, parts: &[&str]| meshloom(folder.path(), args).fails_with(parts);
+    refused(
+        "morph poses -o s.pc2 --space gradients",
+        &["without a shape space"],
+    );
+    meshloom(
+        folder.path(),
+        "morph poses -o t.pc2 --method spline --space x",
+    )
+    .fails_with_any(&["`x`"]);
+}
+
+/// A plane polygon of four triangles; its last vertex at `tip`, all of it `size` times as large.
+fn plate(tip: [f64; 2], size: f64) -> String {
+    let corners = [
+        [0.0, 0.0],
+        [4.0, 0.0],
+        [4.0, 3.0],
+        [0.0, 3.0],
+        [2.0, 6.0],
+        tip,
+    ];
+    let vertex = |[x, y]: [f64; 2]| format!("v {} {} 0\n", x * size, y * size);
+    let faces = "f 1 2 3\nf 1 3 4\nf 4 3 5\nf 4 5 6\n";
+    corners.map(vertex).concat() + faces
+}
+
+#[test]
+fn poses_that_fold_stretch_or_have_no_area_are_done_and_told() {
+    let folder = tempdir().unwrap();
+    let put = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+    put("open.obj", &plate([-1.0, 5.0], 1.0));
+    // the tip folded over the side from (0, 3) to (2, 6), within the plane
+    put(
+        "folded.obj",
+        &plate([2.230769230769231, 2.846153846153846], 1.0),
+    );
+    put("large.obj", &plate([-1.0, 5.0], 2.0));
+    // the tip on the line of that side
+    put("flat.obj", &plate([1.0, 4.5], 1.0));
+    let warnings = |poses: &str| {
+        let args = format!("morph {poses} -o out.pc2 --frames 5 --json");
+        let object = meshloom(folder.path(), &args).done().object();
+        let worst = object["report"]["edges"]["worst_percent"].as_f64().unwrap();
+        // lengths of polygons are exact up to the file's f32
+        assert!(worst < 1e-3, "{poses}: {worst}");
+        object["warnings"].to_string()
+    };
+    let folded = warnings("open.obj folded.obj");
+    assert!(
+        folded.contains("opposite normals") && folded.contains("face"),
+        "{folded}"
+    );
+    let large = warnings("open.obj large.obj");
+    assert!(
+        large.contains("not near-isometric") && large.contains("67 %"),
+        "{large}"
+    );
+    warnings("open.obj flat.obj");
+    warnings("flat.obj flat.obj");
+}

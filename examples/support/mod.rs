@@ -75,7 +75,7 @@ impl Figure {
             (None, Some(demo)) => ((demo.generate)(), demo.view),
             (None, None) => return Diagnostic::error(format!("no demo `{demo}`")).err(),
         };
-        let view = View::of(&sequence, direction);
+        let view = View::looking(&sequence, direction);
         Ok((sequence, view))
     }
 
@@ -149,7 +149,7 @@ pub(crate) struct View {
 }
 
 impl View {
-    fn of(sequence: &Sequence, [yaw, pitch]: [f64; 2]) -> Self {
+    pub(crate) fn looking(sequence: &Sequence, [yaw, pitch]: [f64; 2]) -> Self {
         let mut camera = Camera {
             yaw,
             pitch,

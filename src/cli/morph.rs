@@ -30,9 +30,14 @@ pub(super) struct Args {
     #[arg(long, short, value_name = "OUT")]
     output: PathBuf,
 
-    /// How shapes between the poses are found: isometric
+    /// How shapes between the poses are found: isometric, or spline (one curve through all poses in a
+    /// shape space)
     #[arg(long, value_name = "METHOD", default_value = MorphMethod::default().name())]
     method: MorphMethod,
+
+    /// The shape space of a spline [default: patch-lri]
+    #[arg(long, value_name = "S")]
+    space: Option<String>,
 
     /// This many frames, evenly over the whole, both ends among them [default: 24 from each pose to the
     /// next]
@@ -90,6 +95,7 @@ impl Args {
         MorphRequest {
             method: self.method,
             frames: self.frames,
+            space: self.space.clone(),
         }
     }
 }

@@ -55,6 +55,17 @@ impl Fitting {
     }
 }
 
+/// How much of the last step is gone once more before triangles are laid on: steps of this kind shrink
+/// slowly in one direction, and with it four do what six do without.
+const MOMENTUM: f64 = 0.7;
+
+/// Writes to `ahead` where `now` goes on to, coming from `before`.
+pub(super) fn forward(before: &[f64], now: &[f64], ahead: &mut [f64]) {
+    for ((ahead, now), before) in ahead.iter_mut().zip(now).zip(before) {
+        *ahead = now + MOMENTUM * (now - before);
+    }
+}
+
 /// Shapes of given edge lengths in the neighbourhood of a pose.
 #[derive(Debug)]
 pub struct Layout<'a> {
@@ -95,16 +106,17 @@ impl<'a> Layout<'a> {
         };
         let targets = sides.iter().map(|sides| Target::new(sides.map(length)));
         let targets: Vec<Target> = targets.collect();
-        let (mut found, mut next) = (self.pose.clone(), self.pose.clone());
-        let mut first = 0.0;
+        let [mut before, mut found, mut ahead] = [(); 3].map(|()| self.pose.clone());
+        let mut largest = 0.0_f64;
         for _ in 0..STEPS {
-            self.fitting.fit(&targets, &found, &mut next);
-            self.settle(&mut next);
-            let pairs = found.iter().zip(&next);
+            forward(&before, &found, &mut ahead);
+            std::mem::swap(&mut before, &mut found);
+            self.fitting.fit(&targets, &ahead, &mut found);
+            self.settle(&mut found);
+            let pairs = before.iter().zip(&found);
             let moved = pairs.map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt();
-            std::mem::swap(&mut found, &mut next);
-            first = moved.max(first);
-            if moved <= SETTLED * first {
+            largest = largest.max(moved);
+            if moved <= SETTLED * largest {
                 break;
             }
         }

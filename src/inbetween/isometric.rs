@@ -11,8 +11,9 @@
 //!    where the whole turns around several times; and which triangle is the root makes no difference.
 //! 2. Each triangle gets the shape of its interpolated lengths. Turned and shaped, the triangles fit
 //!    together along the tree only; positions follow by the Poisson system ([`crate::mesh::Poisson`]).
-//! 3. [`FITS`] times: each triangle of interpolated lengths is laid onto the one that was found, and
-//!    positions are solved for again. Each brings edges nearer to their lengths.
+//! 3. [`FITS`] times: each triangle of interpolated lengths is laid onto the one that was found, a little
+//!    further on the way of the step before, and positions are solved for again. Each brings edges nearer
+//!    to their lengths.
 //!
 //! The rigid motion between the poses (and between parts) is taken off first and put back at the end, so
 //! that both poses are met as they are given. Nothing depends on the numbering of vertices and
@@ -23,7 +24,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
-use super::fitting::{Fitting, Target};
+use super::fitting::{Fitting, Target, forward};
 use super::polygon::{Polygon, is_polygon, normal, point, put, side_lengths};
 use crate::math::direction;
 use crate::math::rotation::{exp, log};
@@ -34,8 +35,8 @@ use crate::mesh::{
 };
 
 /// How often triangles are laid onto what was found and positions solved for again: on ten poses of a
-/// horse the mean error of an edge falls to 0.45 of the first solution's, the worst to 0.6.
-pub const FITS: usize = 6;
+/// horse the mean error of an edge falls to half that of gradients, the worst below 26 %.
+pub const FITS: usize = 4;
 
 /// Whether the rigid motion between the poses is taken off before they are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -468,10 +469,11 @@ impl Mesh {
         };
         let targets: Vec<Target> = from.iter().zip(to).map(blend).collect();
         self.fitting.turned(&targets, &self.turns_at(t), positions);
-        let mut found = vec![0.0; positions.len()];
+        let (mut before, mut ahead) = (positions.to_vec(), vec![0.0; positions.len()]);
         for _ in 0..FITS {
-            found.copy_from_slice(positions);
-            self.fitting.fit(&targets, &found, positions);
+            forward(&before, positions, &mut ahead);
+            before.copy_from_slice(positions);
+            self.fitting.fit(&targets, &ahead, positions);
         }
     }
 

@@ -1,8 +1,11 @@
 //! How well edges keep to the lengths that a morph gives them.
 
+use rayon::prelude::*;
 use serde::Serialize;
 
+use super::{Moment, doubles};
 use crate::diag::Diagnostic;
+use crate::mesh::{Edges, FrameSource, Sequence};
 
 /// Errors of edge lengths over the frames of a morph, against the straight path between their lengths
 /// in the poses.
@@ -27,6 +30,33 @@ pub struct Strain {
     pub mean_percent: f64,
     /// The largest, in percent.
     pub worst_percent: f64,
+}
+
+/// The errors of all frames, and the largest strain between neighbouring poses.
+pub(super) fn measured(
+    poses: &Sequence,
+    frames: &Sequence,
+    moments: &[Moment],
+) -> (EdgeReport, Strain) {
+    let edges = Edges::new(poses.topology());
+    let lengths: Vec<Vec<f64>> = (0..poses.frames())
+        .into_par_iter()
+        .map(|pose| lengths(edges.ends(), &doubles(poses, pose)))
+        .collect();
+    let errors: Vec<FrameErrors> = moments
+        .par_iter()
+        .enumerate()
+        .map(|(frame, moment)| {
+            let from = &lengths[moment.pose];
+            let to = lengths.get(moment.pose + 1).unwrap_or(from);
+            let wanted = |edge: usize| from[edge] * (1.0 - moment.t) + to[edge] * moment.t;
+            FrameErrors::of(edges.ends(), wanted, &doubles(frames, frame))
+        })
+        .collect();
+    let pairs = lengths.windows(2);
+    let strains = pairs.map(|pair| Strain::between(&pair[0], &pair[1]));
+    let strain = strains.fold(Strain::default(), Strain::join);
+    (EdgeReport::of(&errors), strain)
 }
 
 /// The errors of one frame, to be joined with others'.

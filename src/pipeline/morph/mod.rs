@@ -4,8 +4,10 @@
 mod edges;
 mod isometric;
 mod skeleton;
+mod spline;
 
 use std::str::FromStr;
+use std::sync::Arc;
 
 use serde::Serialize;
 
@@ -24,16 +26,19 @@ pub enum MorphMethod {
     /// Lengths linear, triangles turned as their neighbours are: see [`crate::inbetween::isometric`].
     #[default]
     Isometric,
+    /// One cubic spline through all poses in a shape space: see [`crate::inbetween::complete()`].
+    Spline,
 }
 
 impl MorphMethod {
     /// All of them.
-    pub const ALL: &[MorphMethod] = &[MorphMethod::Isometric];
+    pub const ALL: &[MorphMethod] = &[MorphMethod::Isometric, MorphMethod::Spline];
 
     /// Its name on the command line and in recipes.
     pub fn name(self) -> &'static str {
         match self {
             MorphMethod::Isometric => "isometric",
+            MorphMethod::Spline => "spline",
         }
     }
 }
@@ -58,6 +63,8 @@ pub struct MorphRequest {
     /// How many frames, both ends among them, at least 2; if not given, 24 from each pose to the
     /// next.
     pub frames: Option<usize>,
+    /// The shape space's name; for the method `spline`, patch-lri if not given.
+    pub space: Option<String>,
 }
 
 /// Frames from one pose to the next where their number is not given: a second of film.
@@ -150,15 +157,52 @@ fn wanted_frames(count: usize, request: &MorphRequest) -> Result<usize> {
 /// # Errors
 /// As [`morph_frames`]; a mesh that the method does not suit, cancellation.
 pub fn morph(poses: &Sequence, request: &MorphRequest, task: &Task) -> Result<Warned<Morph>> {
-    let (count, frames) = (poses.frames(), morph_frames(poses, request)?);
-    let moments = moments(frames, count);
-    let mut morph = match request.method {
-        MorphMethod::Isometric => isometric::morph(poses, &moments, task)?,
+    let moments = moments(morph_frames(poses, request)?, poses.frames());
+    task.phase("morph", moments.len());
+    let mut warnings = Vec::new();
+    let found = match request.method {
+        MorphMethod::Isometric => {
+            no_space(request)?;
+            isometric::morph(poses, &moments, task)?
+        }
+        MorphMethod::Spline => spline::morph(poses, &moments, request, task)?,
     };
-    morph
-        .warnings
-        .extend(edges::strain_warning(&morph.output.report.strain));
-    Ok(morph)
+    let found = found.unpack(&mut warnings);
+    let frames = Sequence::new(Arc::clone(poses.topology()), found.positions, poses.fps());
+    let (edges, strain) = edges::measured(poses, &frames, &moments);
+    warnings.extend(edges::strain_warning(&strain));
+    Ok(Warned {
+        output: Morph {
+            frames,
+            report: MorphReport {
+                method: request.method.name(),
+                poses: poses.frames(),
+                edges,
+                strain,
+                alignment: found.alignment,
+            },
+        },
+        warnings,
+    })
+}
+
+/// What a method finds: the coordinates of all frames in a row, those at poses being the poses.
+struct Found {
+    positions: Vec<f32>,
+    alignment: Option<AlignmentReport>,
+}
+
+/// Refuses a space where the method has none.
+fn no_space(request: &MorphRequest) -> Result<()> {
+    match &request.space {
+        None => Ok(()),
+        Some(_) => Diagnostic::error(format!(
+            "the method {} works without a shape space",
+            request.method.name()
+        ))
+        .hint("leave the space out, or take the method spline")
+        .err(),
+    }
 }
 
 /// Where `frames` frames lie among `poses` poses, at least two of both; exact at poses.
@@ -179,8 +223,6 @@ fn doubles(poses: &Sequence, pose: usize) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use super::*;
     use crate::mesh::Topology;
 
@@ -232,6 +274,28 @@ mod tests {
             &Task::default(),
         );
         assert_eq!(found.unwrap().output.frames.frames(), 49);
+    }
+
+    #[test]
+    fn a_spline_goes_through_the_poses_in_any_space() {
+        let poses = roofs(&[0.0, 0.8, -0.3]);
+        for space in [None, Some("gradients"), Some("vertices")] {
+            let request = MorphRequest {
+                method: MorphMethod::Spline,
+                frames: Some(9),
+                space: space.map(String::from),
+            };
+            let found = morph(&poses, &request, &Task::default()).unwrap().output;
+            for (frame, pose) in [(0, 0), (4, 1), (8, 2)] {
+                assert_eq!(found.frames.frame(frame), poses.frame(pose), "{space:?}");
+            }
+            assert!(found.frames.positions().iter().all(|x| x.is_finite()));
+        }
+        let request = MorphRequest {
+            space: Some("gradients".into()),
+            ..MorphRequest::default()
+        };
+        assert!(morph(&poses, &request, &Task::default()).is_err());
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::edges::{EdgeReport, FrameErrors, Strain, lengths, strain_warning};
-use super::{MorphMethod, MorphReport, MorphRequest, moments, wanted_frames};
+use super::{MorphMethod, MorphReport, MorphRequest, moments, no_space, wanted_frames};
 use crate::diag::{Diagnostic, Result, Warned};
 use crate::format::skeleton::{SkeletonFormat, by_ending};
 use crate::inbetween::isometric::Alignment;
@@ -104,6 +104,7 @@ pub fn morph_skeletons(
         .hint("skeletons take the method isometric")
         .err();
     }
+    no_space(request)?;
     let (count, frames) = (poses.frames(), wanted_frames(poses.frames(), request)?);
     task.phase("morph", frames);
     let (bones, width) = (poses.skeleton.bones(), poses.frame(0).len());

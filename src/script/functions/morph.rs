@@ -15,7 +15,7 @@ pub(super) fn register(engine: &mut Engine) {
 }
 
 fn request(options: Map) -> Raw<MorphRequest> {
-    let options = Options::new(options, &["method", "frames"])?;
+    let options = Options::new(options, &["method", "space", "frames"])?;
     let method = options
         .word("method")?
         .map_or(Ok(MorphMethod::default()), |name| {
@@ -25,6 +25,7 @@ fn request(options: Map) -> Raw<MorphRequest> {
     Ok(MorphRequest {
         method: pass(method)?,
         frames: options.count("frames", 2)?,
+        space: options.word("space")?,
     })
 }
 
@@ -32,10 +33,11 @@ fn request(options: Map) -> Raw<MorphRequest> {
 mod functions {
     /// The frames between poses of one mesh; those at the poses are the poses themselves.
     ///
-    /// `morph(poses)`, `morph(poses, #{ method, frames })`
+    /// `morph(poses)`, `morph(poses, #{ method, space, frames })`
     ///
     /// poses is an array of meshes, or a sequence; frames is their number over the whole (24 from each pose
-    /// to the next). method "isometric": edge lengths go linearly, triangles turn as their neighbours do.
+    /// to the next). method "isometric": edge lengths go linearly, triangles turn as their neighbours do;
+    /// "spline": one curve through all poses in a shape space (patch-lri).
     ///
     /// ```rhai
     /// let bar = demo("bar");
