@@ -193,7 +193,14 @@ mod tests {
             let ground = Ground::open(name, &topology, &poses).unwrap();
             let code = ground.moved(&poses[0], &poses[0], &poses[1]);
             let shape = ground.decode(&code, &poses[0]).unwrap();
-            assert!(aligned_rms(&poses[1], &shape) < 1e-5, "{name}");
+            if name == EDGE_LENGTHS {
+                // an open tube is not rigid: many shapes have these lengths
+                let (asked, found) = (ground.encode(&poses[1]), ground.encode(&shape));
+                let misses = asked.iter().zip(&found).map(|(a, b)| (a / b - 1.0).abs());
+                assert!(misses.sum::<f64>() < 1e-3 * asked.len() as f64);
+            } else {
+                assert!(aligned_rms(&poses[1], &shape) < 1e-5, "{name}");
+            }
             let none = ground.moved(&poses[2], &poses[1], &poses[1]);
             let same = ground.decode(&none, &poses[2]).unwrap();
             assert!(aligned_rms(&poses[2], &same) < 1e-5, "{name}");

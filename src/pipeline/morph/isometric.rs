@@ -12,6 +12,7 @@ use crate::task::Task;
 
 /// The frames at `moments` of a morph over all poses.
 pub(super) fn morph(poses: &Sequence, moments: &[Moment], task: &Task) -> Result<Warned<Found>> {
+    task.phase("morph", moments.len());
     let connectivity =
         Connectivity::new(poses.topology(), &doubles(poses, 0)).map_err(SpaceError::from)?;
     let width = 3 * poses.topology().vertices();

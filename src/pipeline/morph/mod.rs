@@ -157,39 +157,53 @@ fn wanted_frames(count: usize, request: &MorphRequest) -> Result<usize> {
 /// # Errors
 /// As [`morph_frames`]; a mesh that the method does not suit, cancellation.
 pub fn morph(poses: &Sequence, request: &MorphRequest, task: &Task) -> Result<Warned<Morph>> {
-    let moments = moments(morph_frames(poses, request)?, poses.frames());
-    task.phase("morph", moments.len());
-    let mut warnings = Vec::new();
-    let found = match request.method {
+    let (count, frames) = (poses.frames(), morph_frames(poses, request)?);
+    let moments = moments(frames, count);
+    let mut morph = match request.method {
         MorphMethod::Isometric => {
             no_space(request)?;
-            isometric::morph(poses, &moments, task)?
+            isometric::morph(poses, &moments, task)?.measured(poses, &moments, request.method)
         }
-        MorphMethod::Spline => spline::morph(poses, &moments, request, task)?,
+        MorphMethod::Spline => {
+            spline::morph(poses, &moments, request, task)?.measured(poses, &moments, request.method)
+        }
     };
-    let found = found.unpack(&mut warnings);
-    let frames = Sequence::new(Arc::clone(poses.topology()), found.positions, poses.fps());
-    let (edges, strain) = edges::measured(poses, &frames, &moments);
-    warnings.extend(edges::strain_warning(&strain));
-    Ok(Warned {
-        output: Morph {
-            frames,
-            report: MorphReport {
-                method: request.method.name(),
-                poses: poses.frames(),
-                edges,
-                strain,
-                alignment: found.alignment,
-            },
-        },
-        warnings,
-    })
+    morph
+        .warnings
+        .extend(edges::strain_warning(&morph.output.report.strain));
+    Ok(morph)
 }
 
 /// What a method finds: the coordinates of all frames in a row, those at poses being the poses.
 struct Found {
     positions: Vec<f32>,
     alignment: Option<AlignmentReport>,
+}
+
+impl Warned<Found> {
+    /// With what edges do from pose to pose.
+    fn measured(self, poses: &Sequence, moments: &[Moment], method: MorphMethod) -> Warned<Morph> {
+        let Warned {
+            output: Found {
+                positions,
+                alignment,
+            },
+            warnings,
+        } = self;
+        let frames = Sequence::new(Arc::clone(poses.topology()), positions, poses.fps());
+        let (edges, strain) = edges::measured(poses, &frames, moments);
+        let report = MorphReport {
+            method: method.name(),
+            poses: poses.frames(),
+            edges,
+            strain,
+            alignment,
+        };
+        Warned {
+            output: Morph { frames, report },
+            warnings,
+        }
+    }
 }
 
 /// Refuses a space where the method has none.
