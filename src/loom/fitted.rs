@@ -4,7 +4,7 @@
 use super::ch12::{self, Signals};
 use super::fidelity::{self, Chosen};
 use super::fit::{FitOptions, Method};
-use super::left_out::{self, LeftOutFit};
+use super::left_out::{LeftOutFit, Trial};
 use super::ordered::{self, Laid, advice};
 use super::pins::{self, Pin};
 use super::report::{Change, Errors, Span};
@@ -51,6 +51,7 @@ pub fn fit_rows(rows: &dyn Rows, options: &FitOptions, task: &Task) -> Result<Fi
             &pca,
             &options.fidelity(),
             (&options.pins, options.near),
+            options.left_out,
             task,
         )?,
     };
@@ -165,17 +166,24 @@ fn left_out(
 ) -> Result<Option<LeftOutFit>> {
     task.phase("left_out", 0);
     let (controls, sites) = (signals.time.controls().len(), signals.pose.sites().len());
+    let Some(trial) = Trial::new(pca, signals.pose.modes(), task)? else {
+        return Ok(None);
+    };
+    let (controls, sites) = trial.share((controls, sites));
     let frames = options.pins.iter().map(|pin| pin.frame - 1);
-    let pins: Vec<(usize, Point)> = frames
+    let pins = frames
         .filter(|frame| frame % 2 == 0)
-        .map(|frame| (frame / 2, signals.layout.positions[frame]))
-        .collect();
-    let method = |subspace: &Subspace, controls: usize, sites: usize| match options.method {
-        Method::Ch12 => ch12::signals(subspace, (controls, sites), (options.alpha, &pins), task),
+        .map(|frame| (frame / 2, signals.layout.positions[frame]));
+    let subspace = trial.subspace();
+    let half = match options.method {
+        Method::Ch12 => {
+            let pins: Vec<(usize, Point)> = pins.collect();
+            ch12::signals(subspace, (controls, sites), (options.alpha, &pins), task)?
+        }
         Method::Ordered => {
-            let pins: Vec<Pin> = pins.iter().map(|&(frame, at)| Pin::at(frame, at)).collect();
-            Laid::out(subspace, None, task)?.signals(controls, sites, &pins, task)
+            let pins: Vec<Pin> = pins.map(|(frame, at)| Pin::at(frame, at)).collect();
+            Laid::out(subspace, None, task)?.signals(controls, sites, &pins, task)?
         }
     };
-    left_out::measure(pca, (controls, sites, signals.pose.modes()), &method, task)
+    Ok(Some(trial.measure(&half)))
 }

@@ -9,7 +9,7 @@ use super::ch12::Signals;
 use super::subspace::{Subspace, decomposed};
 use crate::diag::Result;
 use crate::math::cubic_spline::{CubicSpline, Ends};
-use crate::math::pca::{Pca, Table};
+use crate::math::pca::{Basis, Pca, Table};
 use crate::task::Task;
 
 /// Relative errors at left-out frames, and where psi does worse than linear blending.
@@ -25,36 +25,81 @@ pub struct LeftOutFit {
     pub worse: Vec<usize>,
 }
 
-/// Fits a method to a subspace with given k and l, clamped to what the subspace allows.
-pub type Method<'a> = &'a dyn Fn(&Subspace, usize, usize) -> Result<Signals>;
+/// Every second frame in a shape subspace of its own, to be fitted, and the frames between to measure with.
+pub struct Trial {
+    halves: Halves,
+    pca: Pca,
+    basis: Basis,
+    subspace: Subspace,
+}
 
-/// Measures `method` at every second frame of `pca`'s rows; (k, l, m) are those of the fit to all frames.
-/// None below 5 frames: too little is left to fit or to measure.
-///
-/// # Errors
-/// The method's own; the task was cancelled.
-pub fn measure(
-    pca: &Pca,
-    fidelity: (usize, usize, usize),
-    method: Method<'_>,
-    task: &Task,
-) -> Result<Option<LeftOutFit>> {
-    if pca.rows() < 5 {
-        return Ok(None);
+impl Trial {
+    /// Of `pca`'s rows with `modes` modes, or as many as half of the frames have. None below 5 frames: too
+    /// little is left to fit or to measure.
+    ///
+    /// # Errors
+    /// The task was cancelled.
+    pub fn new(pca: &Pca, modes: usize, task: &Task) -> Result<Option<Self>> {
+        if pca.rows() < 5 {
+            return Ok(None);
+        }
+        let halves = Halves::of(&pca.reduced(), pca.rows());
+        let table = Table::new(&halves.kept, halves.width);
+        let most = halves.kept.len() / halves.width - 1;
+        let (pca, basis) = decomposed(&table, modes.min(most), task)?;
+        Ok(Some(Trial {
+            subspace: Subspace::new(&pca, &basis),
+            halves,
+            pca,
+            basis,
+        }))
     }
-    let halves = Halves::of(&pca.reduced(), pca.rows());
-    let psi = halves.errors(&halves.psi(fidelity, method, task)?);
-    let linear = halves.errors(&halves.linear());
-    let cubic = halves.errors(&halves.cubic());
-    let worse = (0..psi.len())
-        .filter(|&i| psi[i] > linear[i])
-        .map(|i| 2 * i + 2);
-    Ok(Some(LeftOutFit {
-        psi: halves.relative(&psi),
-        linear: halves.relative(&linear),
-        cubic: halves.relative(&cubic),
-        worse: worse.collect(),
-    }))
+
+    /// The frames that are fitted.
+    pub fn subspace(&self) -> &Subspace {
+        &self.subspace
+    }
+
+    /// (k, l) of the fit to all frames as those of one to half of them: k/n and l/n stay.
+    pub fn share(&self, (controls, sites): (usize, usize)) -> (usize, usize) {
+        let (n, half) = (self.halves.width, self.subspace.frames);
+        let share = |count: usize| (count * half + n / 2) / n;
+        // an interpolating time signal has two control points more than frames
+        match controls == n + 2 {
+            true => (half + 2, share(sites)),
+            false => (share(controls), share(sites)),
+        }
+    }
+
+    /// What `signals` of [`Trial::subspace`] are worth at the frames between.
+    pub fn measure(&self, signals: &Signals) -> LeftOutFit {
+        let halves = &self.halves;
+        let psi = halves.errors(&self.psi(signals));
+        let linear = halves.errors(&halves.linear());
+        let worse = (0..psi.len()).filter(|&i| psi[i] > linear[i]);
+        LeftOutFit {
+            psi: halves.relative(&psi),
+            linear: halves.relative(&linear),
+            cubic: halves.relative(&halves.errors(&halves.cubic())),
+            worse: worse.map(|i| 2 * i + 2).collect(),
+        }
+    }
+
+    fn psi(&self, signals: &Signals) -> Vec<f64> {
+        let halves = &self.halves;
+        let mut x = vec![0.0; self.basis.modes];
+        let mut found = Vec::with_capacity(halves.out.len());
+        for i in 0..halves.count() {
+            let p = signals.time.at(Halves::time(i)).unwrap_or_default();
+            signals.pose.evaluate(p, &mut x);
+            let mut row = self.pca.mean().to_vec();
+            for (x, vector) in x.iter().zip(self.basis.vectors.chunks_exact(halves.width)) {
+                row.iter_mut().zip(vector).for_each(|(z, h)| *z += x * h);
+            }
+            found.extend(row);
+        }
+        found
+    }
 }
 
 /// The fewest modes, from `least` on, for which a cubic spline in the shape subspace of the kept frames
@@ -176,37 +221,5 @@ impl Halves {
             }
         }
         rows
-    }
-
-    fn psi(
-        &self,
-        (controls, sites, modes): (usize, usize, usize),
-        method: Method<'_>,
-        task: &Task,
-    ) -> Result<Vec<f64>> {
-        let (n, half) = (self.width, self.kept.len() / self.width);
-        let share = |count: usize| (count * half + n / 2) / n;
-        // an interpolating time signal has two control points more than frames
-        let controls = if controls == n + 2 {
-            half + 2
-        } else {
-            share(controls)
-        };
-        let rows = Table::new(&self.kept, self.width);
-        let (pca, basis) = decomposed(&rows, modes.min(half - 1), task)?;
-        let signals = method(&Subspace::new(&pca, &basis), controls, share(sites))?;
-        let mut x = vec![0.0; basis.modes];
-        let mut found = Vec::with_capacity(self.out.len());
-        for i in 0..self.count() {
-            signals
-                .pose
-                .evaluate(signals.time.at(Halves::time(i)).unwrap_or_default(), &mut x);
-            let mut row = pca.mean().to_vec();
-            for (x, vector) in x.iter().zip(basis.vectors.chunks_exact(self.width)) {
-                row.iter_mut().zip(vector).for_each(|(z, h)| *z += x * h);
-            }
-            found.extend(row);
-        }
-        Ok(found)
     }
 }

@@ -200,8 +200,9 @@ impl Session {
         self.pins.retain(|&(held, _)| held != frame);
     }
 
-    /// The signals of a fit under the present pins: layout from the leading coordinates, sites chosen
-    /// anew, k and l as before.
+    /// The signals of a fit under the present pins: sites chosen anew, k and l as before. The layout starts
+    /// from the leading coordinates; that of an ordered fit keeps its tau and theta, so that the map stays
+    /// the one that is known.
     ///
     /// # Errors
     /// The task was cancelled.
@@ -225,7 +226,8 @@ impl Session {
             .map(|&(frame, to)| Pin::at(frame, to))
             .collect();
         let sites = self.pose.sites().len();
-        let laid = Laid::out(&self.subspace, None, task)?;
+        let near = self.ordered.as_ref().map(Drag::choice);
+        let laid = Laid::out(&self.subspace, near, task)?;
         let signals = laid.signals(self.controls, sites, &pins, task)?;
         self.layout = signals.layout.clone();
         self.pose = signals.pose.clone();

@@ -46,6 +46,11 @@ impl Drag {
         })
     }
 
+    /// (tau, theta), which stay.
+    pub fn choice(&self) -> (f64, f64) {
+        (self.ordered.tau, self.ordered.theta)
+    }
+
     /// Signals with the `pins` (frames from 0) held, near those before.
     ///
     /// # Errors

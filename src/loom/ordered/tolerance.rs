@@ -5,13 +5,16 @@
 //! coordinate, at left-out frames); l is 2m, grown where that is not enough; k is the smallest of a row of
 //! tenths of n. Enough is: error at the frames and deviation from the cubic spline between them, both with
 //! the shape error, within T, and no deviation between frames that is seen ([`VISIBLE`]).
+//!
+//! Few numbers can meet all samples and still say little about what lies between *other* frames: where the
+//! left-out error is measured, k and l that are not given also grow until it is near the cubic spline's.
 
 use super::advice::VISIBLE;
 use super::{Laid, SITES_PER_MODE};
 use crate::diag::Result;
 use crate::loom::ch12::Signals;
 use crate::loom::fidelity::{Chosen, Fidelity, total};
-use crate::loom::left_out;
+use crate::loom::left_out::{self, Trial};
 use crate::loom::pins::Pin;
 use crate::loom::subspace::{Subspace, explained};
 use crate::math::pca::{Basis, Pca, Rows};
@@ -20,11 +23,14 @@ use crate::task::Task;
 /// What leaving out modes may cost between frames.
 const CUT: f64 = 1.05;
 
+/// The left-out error may be so many times that of a cubic spline in every coordinate.
+const LEFT_OUT: f64 = 1.08;
+
 /// Control points that are tried, in tenths of the frames, most first; the first is the usual number.
 const TENTHS: [usize; 4] = [8, 6, 4, 3];
 
 /// Fits with what is given, and as few of the rest as the tolerance allows; full fidelity where nothing
-/// keeps it.
+/// keeps it. With `between`, as few as left-out frames allow, too.
 ///
 /// # Errors
 /// The task was cancelled; coordinates too large to be squared.
@@ -33,6 +39,7 @@ pub fn choose(
     pca: &Pca,
     fidelity: &Fidelity,
     (pins, near): (&[Pin], Option<(f64, f64)>),
+    between: bool,
     task: &Task,
 ) -> Result<(Basis, Chosen)> {
     let modes = match fidelity.modes {
@@ -52,7 +59,13 @@ pub fn choose(
         pins,
         task,
     };
-    let (signals, met) = search.least(fidelity)?;
+    let (mut signals, met) = search.least(fidelity)?;
+    if between && !fidelity.is_given() && signals.ordered.is_some() {
+        let numbers = (signals.time.controls().len(), signals.pose.sites().len());
+        if let Some((controls, sites)) = search.general(numbers, fidelity, pca)? {
+            signals = search.fit(controls, sites)?;
+        }
+    }
     let chosen = Chosen {
         signals,
         met,
@@ -90,6 +103,43 @@ impl Search<'_> {
         }
         let met = self.keeps(&signals);
         Ok((signals, met))
+    }
+
+    /// From `numbers` (k and l) on, the fewest whose fit to every second frame is near the cubic spline
+    /// between them; the best where none is, and nothing where `numbers` will do.
+    fn general(
+        &self,
+        numbers: (usize, usize),
+        fidelity: &Fidelity,
+        pca: &Pca,
+    ) -> Result<Option<(usize, usize)>> {
+        let Some(trial) = Trial::new(pca, self.subspace.modes, self.task)? else {
+            return Ok(None);
+        };
+        let laid = Laid::out(trial.subspace(), None, self.task)?;
+        let n = self.subspace.frames;
+        let more = |count: usize, most: usize, given: Option<usize>| match given {
+            Some(_) => count,
+            None => (count + count.div_ceil(4)).min(most.max(count)),
+        };
+        let (mut now, mut best) = (numbers, (f64::INFINITY, numbers));
+        loop {
+            let (controls, sites) = trial.share(now);
+            let half = laid.signals(controls, sites, &[], self.task)?;
+            let found = trial.measure(&half);
+            if found.psi < best.0 {
+                best = (found.psi, now);
+            }
+            let (controls, sites) = now;
+            now = (
+                more(controls, n + 2, fidelity.controls),
+                more(sites, n, fidelity.sites),
+            );
+            if found.psi <= LEFT_OUT * found.cubic || now == (controls, sites) {
+                break;
+            }
+        }
+        Ok(Some(best.1).filter(|&best| best != numbers))
     }
 
     /// The fewest sites with so many control points.

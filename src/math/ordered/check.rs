@@ -13,11 +13,19 @@ const SPIKE: f64 = 1.6;
 const OF_FLOOR: f64 = 0.4;
 const OF_LINEAR: f64 = 0.2;
 
+/// What a trial may be worse by than a good fit: refinement halves most errors, but seldom the worst.
+const TRIAL: f64 = 3.0;
+const TRIAL_WORST: f64 = 1.4;
+/// Errors at the frames of so little are none.
+const EXACT: f64 = 5e-5;
+
 /// Deviations of g(f(t)) from the motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quality {
     /// Root mean square at the fitted samples, relative to the motion's spread.
     pub at_samples: f64,
+    /// The same at the frames alone.
+    pub at_frames: f64,
     /// The same at twice as many samples.
     pub between: f64,
     /// The largest of those, in root mean square steps between frames.
@@ -26,6 +34,8 @@ pub struct Quality {
     pub spiked: bool,
     /// Not spiked, nowhere visible, and lost in what the modes leave out or linear interpolation is off.
     pub good: bool,
+    /// Good up to so much that further refinement mends: what a first trial must be.
+    pub promising: bool,
 }
 
 impl Quality {
@@ -37,17 +47,32 @@ impl Quality {
         };
         let missed = (&samples.dense - at, &samples.finer - between);
         let at_samples = missed.0.norm_l2() * 2f64.sqrt() / samples.spread;
+        let frames = (0..samples.frames).map(|i| missed.0.row(i * samples.rate).squared_norm_l2());
+        let at_frames = (frames.sum::<f64>() * (2 * samples.rate) as f64).sqrt() / samples.spread;
         let between = missed.1.norm_l2() / samples.spread;
         let (worst_at, worst) = (largest(&missed.0), largest(&missed.1));
         let linear = OF_LINEAR * samples.linear / samples.spread;
         let spiked = between > (SPIKE * at_samples).max(linear)
             || worst > VISIBLE && worst > 2.0 * SPIKE * worst_at;
+        let lost = linear.max(OF_FLOOR * floor);
         Quality {
             at_samples,
+            at_frames,
             between,
             worst,
             spiked,
-            good: !spiked && worst <= VISIBLE && between <= linear.max(OF_FLOOR * floor),
+            promising: !spiked && worst <= TRIAL_WORST * VISIBLE && between <= TRIAL * lost,
+            good: !spiked && worst <= VISIBLE && between <= lost,
         }
+    }
+
+    /// Whether the frames are met, up to what is lost in `floor`, and nothing between them is seen.
+    pub(super) fn is_settled(&self, floor: f64) -> bool {
+        self.at_frames <= (OF_FLOOR * floor).max(EXACT) && self.worst <= VISIBLE
+    }
+
+    /// How bad: the deviation between the samples, the more the more it is seen in one place.
+    pub(super) fn cost(&self) -> f64 {
+        self.between * (self.worst / VISIBLE).max(1.0).sqrt()
     }
 }

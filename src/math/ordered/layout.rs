@@ -18,16 +18,18 @@ use crate::math::order_graph::geodesics;
 use crate::math::symmetric;
 use crate::task::{Cancelled, Task};
 
-/// Reaches of the order graph, in root mean square distances.
-const REACHES: [f64; 7] = [0.2, 0.14, 0.1, 0.07, 0.05, 0.025, 0.0];
-/// The walk from geodesic (1) to plain distances (0).
-const WALK: [f64; 7] = [0.8, 0.6, 0.45, 0.3, 0.2, 0.1, 0.0];
+/// Reaches of the order graph, in root mean square distances. Each is half the one before: neighbours
+/// are so different that a little more or less of the motion seldom changes which one is chosen.
+const REACHES: [f64; 5] = [0.2, 0.1, 0.05, 0.025, 0.0];
+/// The walk from geodesic (1) to plain distances (0), coarse for the same reason.
+const WALK: [f64; 2] = [HALFWAY, 0.0];
+const HALFWAY: f64 = 0.5;
 /// A layout is accepted up to so many times the best score found,
 const WORSE: f64 = 1.5;
 /// .. or up to so many times what the modes leave out.
 const FLOORS: f64 = 0.75;
 /// So many candidates are worth refining.
-const CANDIDATES: usize = 4;
+const CANDIDATES: usize = 6;
 /// Softening of the weights, of the largest distance.
 const SOFTENING: f64 = 0.02;
 /// The stress need not be exact: refinement moves the curve anyway.
@@ -146,7 +148,7 @@ pub(super) fn held(
 
 /// Lays the motion out unrolled for each reach, walks from the largest accepted one, and returns what
 /// is worth refining in the order in which it should be tried: the end of the walk, its start, then the
-/// unrolled ones of the least scores. Never empty.
+/// unrolled ones of the least scores, each after what lies halfway from it. Never empty.
 pub(super) fn candidates(
     order: &Order,
     samples: &Samples,
@@ -172,8 +174,10 @@ pub(super) fn candidates(
     }
     unrolled.remove(first);
     unrolled.sort_by(|a, b| a.score.total_cmp(&b.score));
-    worth.extend(unrolled);
-    worth.truncate(CANDIDATES);
+    for one in unrolled.into_iter().take((CANDIDATES - worth.len()) / 2) {
+        worth.push(halfway(order, &scale, &one, task)?);
+        worth.push(one);
+    }
     Ok(worth)
 }
 
@@ -239,6 +243,21 @@ fn walk(
         walk.push(next);
     }
     Ok(walk)
+}
+
+/// Halfway from an unrolled layout to plain distances.
+fn halfway(
+    order: &Order,
+    scale: &Scale<'_>,
+    unrolled: &Candidate,
+    task: &Task,
+) -> Result<Candidate, Cancelled> {
+    let choice = Choice {
+        theta: HALFWAY,
+        ..unrolled.choice
+    };
+    let start = points(unrolled.layout.as_ref());
+    scale.candidate(choice, &order.targets(choice), &start, task)
 }
 
 /// What scores a layout.

@@ -9,7 +9,7 @@
 //! - `layout`: the frames are laid out by distances along the motion (geodesics of the order graph),
 //!   then walked towards plain distances as long as no saddle between the frames results;
 //! - `refine`: curve and sites together, by variable projection;
-//! - `check`: a spike between the samples sends the fit back to the next layout in reserve;
+//! - `check`: what is not right between the samples sends the fit back to the next layout in reserve;
 //! - `drag`: a few steps from the last state while a pin is moved.
 //!
 //! The plane is measured in radii of the unpinned layout: its frames have a root mean square distance of
@@ -33,6 +33,13 @@ use crate::task::{Cancelled, Task};
 pub use check::Quality;
 pub use drag::{Drag, Moving};
 pub use layout::Choice;
+
+/// A later candidate is taken only where it costs so many times less: the earlier ones are better maps,
+/// and a choice between equals would change with every frame more.
+const CLEARLY: f64 = 0.8;
+
+/// So many rounds more are spent on a fit that is not yet right.
+const AGAIN: usize = 2;
 
 /// Fidelity of an ordered fit.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -169,7 +176,8 @@ impl Motion {
         Ok(best)
     }
 
-    /// Chooses the first candidate that becomes good; the best of them where none does. Returns how good.
+    /// Chooses the first candidate that promises to become good; the best of them where none does.
+    /// Returns how good it is.
     fn choose(&mut self, task: &Task) -> Result<Option<Quality>, Cancelled> {
         let samples = &self.samples;
         let curve = samples.curve(samples.usual_controls());
@@ -180,12 +188,13 @@ impl Motion {
             let quality = draft.quality(samples, &curve, self.floor);
             task.step();
             // The earlier ones are better maps: they are kept unless another is clearly better.
-            if quality.good || chosen.is_none_or(|best| quality.between < 0.8 * best.between) {
+            if quality.promising || chosen.is_none_or(|best| quality.cost() < CLEARLY * best.cost())
+            {
                 chosen = Some(quality);
                 self.chosen = index;
                 self.trial = Some(draft);
             }
-            if quality.good {
+            if quality.promising {
                 break;
             }
         }
@@ -210,9 +219,35 @@ impl Motion {
                 .refined(samples, &curve, pins, LOOSE, task)?,
         };
         task.step();
-        let draft = draft.refined(samples, &curve, pins, firm(samples.frames), task)?;
+        let draft = self.firm(draft, &curve, pins, task)?;
         task.step();
         Ok(self.fitted(draft, &curve, &candidate))
+    }
+
+    /// Refined to the end: once more, held less firmly, as long as frames or what lies between them are
+    /// not met and that helps.
+    fn firm(
+        &self,
+        draft: Draft,
+        curve: &Curve,
+        pins: &[(usize, Point)],
+        task: &Task,
+    ) -> Result<Draft, Cancelled> {
+        let (samples, round) = (&self.samples, firm(self.samples.frames));
+        let mut draft = draft.refined(samples, curve, pins, round, task)?;
+        for _ in 0..AGAIN {
+            let before = draft.quality(samples, curve, self.floor);
+            if before.is_settled(self.floor) {
+                break;
+            }
+            let next = draft.clone().refined(samples, curve, pins, round, task)?;
+            let after = next.quality(samples, curve, self.floor);
+            if after.between >= before.between && after.at_frames >= before.at_frames {
+                break;
+            }
+            draft = next;
+        }
+        Ok(draft)
     }
 
     /// A spiked fit refined once more with twice as many samples: what was between them is now met.

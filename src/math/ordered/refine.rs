@@ -9,8 +9,8 @@ use crate::math::b_spline::Point;
 use crate::math::variable_projection::{self, Options, Plate, Problem, Refined};
 use crate::task::{Cancelled, Task};
 
-/// How far the curve may stray from its layout before that costs [`STRAYING`] of the first residual,
-/// in radii of the layout.
+/// How far the curve may stray from its layout before that costs [`STRAYING`] of a round's first
+/// residual, in radii of the layout: what is held on to for little is let go later.
 const STRAY: f64 = 0.1;
 const STRAYING: f64 = 0.05;
 /// What sites cost that stray by one radius each, of a round's first residual: without it some run
@@ -28,19 +28,19 @@ pub(super) struct Round {
 /// From a layout.
 pub(super) const LOOSE: Round = Round {
     evaluations: 15,
-    bending: 0.3,
+    bending: 0.15,
 };
 /// To the end, for n frames: short motions cost little and are taken further.
 pub(super) fn firm(frames: usize) -> Round {
     Round {
         evaluations: (5000 / frames.max(1)).clamp(25, 60),
-        bending: 0.05,
+        bending: 0.025,
     }
 }
 /// While a pin is dragged.
 pub(super) const QUICK: Round = Round {
     evaluations: 3,
-    bending: 0.05,
+    bending: 0.025,
 };
 
 /// A curve and a plate on their way.
@@ -50,15 +50,15 @@ pub(super) struct Draft {
     pub(super) controls: Mat<f64>,
     /// g.
     pub(super) plate: Plate,
-    /// Where the curve is held, k x 2, and how firmly.
+    /// Where the curve is held, k x 2, and whether it is.
     pub(super) anchor: Mat<f64>,
-    pub(super) hold: f64,
+    pub(super) held: bool,
     pub(super) evaluations: usize,
     pub(super) converged: bool,
 }
 
 impl Draft {
-    /// The least-squares curve over a layout (through the pins), sites at even times on it, and the
+    /// The least-squares curve over a layout (through the pins), sites on it where the motion bends, and the
     /// plate of least squares over both.
     pub(super) fn over(
         samples: &Samples,
@@ -69,10 +69,9 @@ impl Draft {
     ) -> Self {
         let points = samples.dense_layout(candidate.layout.as_ref());
         let controls = curve.fit(points.as_ref(), pins);
-        let sites = curve.even_points(controls.as_ref(), sites);
+        let sites = curve.points_at(controls.as_ref(), &samples.site_times(sites));
         let mut draft = Draft::at(samples, curve, controls, &sites);
-        let rows = samples.dense.nrows() as f64;
-        draft.hold = STRAYING * draft.residual(samples, curve) / (rows * STRAY * STRAY);
+        draft.held = true;
         draft
     }
 
@@ -85,7 +84,8 @@ impl Draft {
     ) -> Self {
         let positions = curve.fitted.design().apply(controls.as_ref());
         let targets = samples.dense.as_ref();
-        let plate = variable_projection::fit_plate(positions.as_ref(), targets, sites.as_ref());
+        let (positions, weights) = (positions.as_ref(), &samples.weights);
+        let plate = variable_projection::fit_plate(positions, targets, weights, sites.as_ref());
         Draft::of(controls, plate)
     }
 
@@ -95,7 +95,7 @@ impl Draft {
             anchor: controls.clone(),
             controls,
             plate,
-            hold: 0.0,
+            held: false,
             evaluations: 0,
             converged: false,
         }
@@ -126,11 +126,16 @@ impl Draft {
             0.0
         };
         let bending = second.transpose() * &second * faer::Scale(price);
-        let hold = spline.gram() * faer::Scale(self.hold);
+        let hold = match self.held {
+            true => STRAYING * residual / (samples.dense.nrows() as f64 * STRAY * STRAY),
+            false => 0.0,
+        };
+        let hold = spline.gram() * faer::Scale(hold);
         let fixed = curve.rows_at(pins);
         let problem = Problem {
             spline,
             targets: samples.dense.as_ref(),
+            weights: &samples.weights,
             anchor: self.anchor.as_ref(),
             hold: hold.as_ref(),
             bending: bending.as_ref(),
@@ -188,7 +193,7 @@ pub(super) fn unrefined(
 ) -> Mat<f64> {
     let points = samples.dense_layout(layout);
     let controls = curve.fitted.fit(points.as_ref());
-    let sites = curve.even_points(controls.as_ref(), sites);
+    let sites = curve.points_at(controls.as_ref(), &samples.site_times(sites));
     let draft = Draft::at(samples, curve, controls, &sites);
     draft
         .plate

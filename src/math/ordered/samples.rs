@@ -12,6 +12,13 @@ const SHORT: usize = 64;
 /// Up to so many frames the layout itself is made on the fitted samples, not on the frames.
 const DENSE_LAYOUT: usize = 120;
 
+/// What a frame counts, for 1 of a sample between frames.
+const KNOWN: f64 = 2.0;
+/// The density of sites is this power of how much the motion bends, ..
+const BENT: f64 = 0.35;
+/// .. which counts at least so much of its mean everywhere.
+const STRAIGHT: f64 = 0.1;
+
 /// Times and the motion at them.
 #[derive(Debug, Clone)]
 pub(super) struct Samples {
@@ -21,8 +28,12 @@ pub(super) struct Samples {
     pub(super) rate: usize,
     /// The fitted samples, N x m, N = rate (n-1) + 1.
     pub(super) dense: Mat<f64>,
+    /// What each fitted sample's difference is multiplied by, N.
+    pub(super) weights: Vec<f64>,
     /// Twice as many to check with.
     pub(super) finer: Mat<f64>,
+    /// How many sites belong before each check sample, up to a factor.
+    bends: Vec<f64>,
     /// Samples an interval of the layout: 1 or `rate`.
     layout_rate: usize,
     /// The motion at the layout's samples.
@@ -68,11 +79,13 @@ impl Samples {
             frames: count,
             rate,
             dense: through(frames, &times(count, rate)),
+            weights: weights(count, rate),
             layout_rate,
             laid_out: through(frames, &times(count, layout_rate)),
             spread: moved.norm_l2(),
             step: (steps.sum::<f64>() / (count - 1) as f64).sqrt(),
             linear: (&finer - chords).norm_l2(),
+            bends: bends(finer.as_ref()),
             finer,
         }
     }
@@ -105,6 +118,23 @@ impl Samples {
     pub(super) fn layout_pins(&self, pins: &[(usize, Point)]) -> Vec<(usize, Point)> {
         let sample = |&(frame, at): &(usize, Point)| (frame * self.layout_rate, at);
         pins.iter().map(sample).collect()
+    }
+
+    /// `count` times for sites, both ends among them: closer together where the motion bends.
+    pub(super) fn site_times(&self, count: usize) -> Vec<f64> {
+        let last = (count.max(2) - 1) as f64;
+        let (sums, pace) = (&self.bends, (self.frames - 1) as f64);
+        let total = sums[sums.len() - 1];
+        let mut at = 0;
+        let time = |j: usize| {
+            let sought = total * j as f64 / last;
+            while at + 2 < sums.len() && sums[at + 1] < sought {
+                at += 1;
+            }
+            let inside = (sought - sums[at]) / (sums[at + 1] - sums[at]);
+            pace * (at as f64 + inside.clamp(0.0, 1.0)) / (sums.len() - 1) as f64
+        };
+        (0..count).map(time).collect()
     }
 
     /// .8 n control points.
@@ -141,7 +171,12 @@ impl Curve {
         let times: Vec<f64> = (0..count)
             .map(|i| self.length * i as f64 / last as f64)
             .collect();
-        UniformDesign::new(controls.nrows(), self.length, &times).apply(controls)
+        self.points_at(controls, &times)
+    }
+
+    /// Its points at `times`.
+    pub(super) fn points_at(&self, controls: MatRef<'_, f64>, times: &[f64]) -> Mat<f64> {
+        UniformDesign::new(controls.nrows(), self.length, times).apply(controls)
     }
 
     /// The curve nearest to `points` at the fitted samples among those through the pins.
@@ -203,6 +238,39 @@ pub(super) fn rows(matrix: MatRef<'_, f64>) -> Vec<f64> {
     (0..matrix.nrows() * width)
         .map(|at| matrix[(at / width, at % width)])
         .collect()
+}
+
+/// Weights of the fitted samples, 1 in root mean square: frames are known, what lies between them is a
+/// spline's guess.
+fn weights(frames: usize, rate: usize) -> Vec<f64> {
+    let rows = rate * (frames - 1) + 1;
+    let squares = KNOWN * KNOWN * frames as f64 + (rows - frames) as f64;
+    let scale = (rows as f64 / squares).sqrt();
+    let weight = |row: usize| if row % rate == 0 { KNOWN } else { 1.0 };
+    (0..rows).map(|row| scale * weight(row)).collect()
+}
+
+/// Sums of the density of sites up to each of `samples`: powers of second differences over two steps.
+fn bends(samples: MatRef<'_, f64>) -> Vec<f64> {
+    let last = samples.nrows() - 1;
+    let bend = |i: usize| {
+        let i = i.clamp(2.min(last), last.saturating_sub(2));
+        let (before, after) = (i.saturating_sub(2), (i + 2).min(last));
+        let chord = samples.row(before) + samples.row(after);
+        (chord - samples.row(i) * faer::Scale(2.0)).norm_l2()
+    };
+    let bend: Vec<f64> = (0..=last).map(bend).collect();
+    let mean = bend.iter().sum::<f64>() / bend.len() as f64;
+    let density = |bend: &f64| match mean > 0.0 {
+        true => libm::pow(bend / mean + STRAIGHT, BENT),
+        false => 1.0,
+    };
+    let density: Vec<f64> = bend.iter().map(density).collect();
+    let mut sums = vec![0.0];
+    for pair in density.windows(2) {
+        sums.push(sums[sums.len() - 1] + 0.5 * (pair[0] + pair[1]));
+    }
+    sums
 }
 
 /// `rate` times an interval over \[0, n-1\], the frames included.

@@ -24,6 +24,8 @@ pub(super) struct Design {
     samples: usize,
     sites: usize,
     ridge: f64,
+    /// What each sample's row is multiplied by, N.
+    pub(super) weights: Vec<f64>,
     /// phi(|p_i - s_j|), N x l.
     pub(super) kernel: Mat<f64>,
     /// log |p_i - s_j|^2, N x l.
@@ -39,7 +41,8 @@ pub(super) struct Design {
 }
 
 impl Design {
-    pub(super) fn new(samples: usize, sites: usize, width: usize, ridge: f64) -> Self {
+    pub(super) fn new(weights: &[f64], sites: usize, width: usize, ridge: f64) -> Self {
+        let samples = weights.len();
         let rows = samples + sites;
         let block = recommended_block_size::<f64>(rows, sites);
         let apply = |columns| {
@@ -53,6 +56,7 @@ impl Design {
             samples,
             sites,
             ridge,
+            weights: weights.to_vec(),
             kernel: Mat::zeros(samples, sites),
             logs: Mat::zeros(samples, sites),
             reflectors: Reflectors::new(sites),
@@ -64,7 +68,7 @@ impl Design {
         }
     }
 
-    /// Solves for the coefficients; returns the squared residual, the ridge's share included.
+    /// Solves for the coefficients; returns the weighted squared residual, the ridge's share included.
     pub(super) fn solve(
         &mut self,
         points: MatRef<'_, f64>,
@@ -74,10 +78,12 @@ impl Design {
         self.fill(points, sites);
         let (samples, count) = (self.samples, self.sites);
         self.projected.fill(0.0);
-        self.projected
-            .as_mut()
-            .subrows_mut(0, samples)
-            .copy_from(targets);
+        for c in 0..targets.ncols() {
+            let column = &mut self.projected.col_as_slice_mut(c)[..samples];
+            for (i, (value, weight)) in column.iter_mut().zip(&self.weights).enumerate() {
+                *value = weight * targets[(i, c)];
+            }
+        }
         let stack = MemStack::new(&mut self.scratch);
         qr_in_place(
             self.factor.as_mut(),
@@ -118,7 +124,7 @@ impl Design {
         self.reflectors.apply_left(&mut plate.weights);
     }
 
-    /// Residual of the last solve, written to the first N rows of `residual`, (N+l) x m; the rows
+    /// Weighted residual of the last solve, written to the first N rows of `residual`, (N+l) x m; the rows
     /// below hold the ridge's share.
     pub(super) fn residual(&mut self, residual: &mut Mat<f64>) {
         residual.copy_from(&self.projected);
@@ -169,6 +175,7 @@ impl Design {
         let ridge = self.ridge.sqrt();
         for j in 0..count {
             let column = &mut self.factor.col_as_slice_mut(j)[..samples];
+            weigh(column, &self.weights);
             let norm = column.iter().map(|x| x * x).sum::<f64>().sqrt();
             let norm = if norm > 0.0 { norm } else { 1.0 };
             column.iter_mut().for_each(|x| *x /= norm);
@@ -176,6 +183,12 @@ impl Design {
             self.factor[(samples + j, j)] = ridge;
         }
     }
+}
+
+/// Every row by its weight.
+pub(super) fn weigh(column: &mut [f64], weights: &[f64]) {
+    let rows = column.iter_mut().zip(weights);
+    rows.for_each(|(value, weight)| *value *= weight);
 }
 
 /// phi and log r^2 between `points` (N x 2) and `sites` (l x 2).

@@ -2,10 +2,10 @@
 //! by variable projection (Golub & Pereyra 1973), the plate's coefficients being eliminated.
 //!
 //! ```text
-//! minimise over C (k x 2), s (l x 2):   min_c |X - B(AC, s) c|^2 + |C - C0|^2_P + C^T E C
+//! minimise over C (k x 2), s (l x 2):   min_c |W (X - B(AC, s) c)|^2 + |C - C0|^2_P + C^T E C
 //! ```
 //!
-//! X is N x m, the samples to be met at N times; A is the N x k design of the curve
+//! X is N x m, the samples to be met at N times, W = diag(w) what each of them counts; A is the N x k design of the curve
 //! ([`UniformDesign`]); B the N x l design of the plate (`design`); P and E are quadratic forms of
 //! the caller: how firmly the curve keeps its place, and what bending costs. Levenberg-Marquardt
 //! steps with Kaufman's Jacobian (1975), which is never formed (`normal`).
@@ -31,6 +31,8 @@ pub struct Problem<'a> {
     pub spline: &'a UniformDesign,
     /// X, N x m.
     pub targets: MatRef<'a, f64>,
+    /// w, N: what each sample's difference is multiplied by.
+    pub weights: &'a [f64],
     /// C0, k x 2.
     pub anchor: MatRef<'a, f64>,
     /// P, k x k, positive semidefinite.
@@ -84,15 +86,16 @@ pub struct Refined {
 }
 
 /// Fits the plate alone: coefficients over given `sites` (l x 2, l >= 3) that meet `targets` (N x m)
-/// at `points` (N x 2) in the least-squares sense.
+/// at `points` (N x 2) in the least-squares sense, differences multiplied by `weights` (N).
 pub fn fit_plate(
     points: MatRef<'_, f64>,
     targets: MatRef<'_, f64>,
+    weights: &[f64],
     sites: MatRef<'_, f64>,
 ) -> Plate {
     let (count, width) = (sites.nrows(), targets.ncols());
     let ridge = Options::default().ridge;
-    let mut design = Design::new(points.nrows(), count, width, ridge);
+    let mut design = Design::new(weights, count, width, ridge);
     let mut plate = Plate::zero(count, width);
     design.solve(points, sites, targets);
     design.plate(sites, &mut plate);
@@ -183,9 +186,9 @@ impl State {
         sites: MatRef<'_, f64>,
         ridge: f64,
     ) -> Self {
-        let (samples, width) = (problem.targets.nrows(), problem.targets.ncols());
+        let (samples, width) = (problem.weights.len(), problem.targets.ncols());
         let mut state = State {
-            design: Design::new(samples, sites.nrows(), width, ridge),
+            design: Design::new(problem.weights, sites.nrows(), width, ridge),
             controls: controls.to_owned(),
             first_sites: sites.to_owned(),
             points: Mat::zeros(samples, 2),

@@ -13,13 +13,13 @@
 //! ```
 //!
 //! The second term of b_a is the derivative of the side conditions' null space (T = \[1 s\]). The
-//! expressions are exact derivatives for ridge 0; Kaufman leaves out of H what vanishes with r.
+//! expressions are exact derivatives for ridge 0, rows of G_a and b_a being weighted as those of r are; Kaufman leaves out of H what vanishes with r.
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 use rayon::prelude::*;
 
-use super::design::Design;
+use super::design::{Design, weigh};
 use super::plate::Plate;
 use crate::math::uniform_spline::UniformDesign;
 
@@ -202,10 +202,9 @@ impl Axis {
         );
         for c in 0..self.slopes.ncols() {
             let slope = plate.affine[(1 + a, c)];
-            self.slopes
-                .col_as_slice_mut(c)
-                .iter_mut()
-                .for_each(|value| *value += slope);
+            let column = self.slopes.col_as_slice_mut(c);
+            column.iter_mut().for_each(|value| *value += slope);
+            weigh(column, &design.weights);
         }
         let turn = side_condition_turn(plate.sites.as_ref(), a);
         let mut shared = vec![0.0; samples];
@@ -219,8 +218,8 @@ impl Axis {
         for j in 0..sites {
             let column = self.moves.col_as_slice_mut(j).iter_mut();
             column
-                .zip(&shared)
-                .for_each(|(value, shared)| *value = -*value - shared);
+                .zip(shared.iter().zip(&design.weights))
+                .for_each(|(value, (shared, weight))| *value = -weight * (*value + shared));
         }
     }
 

@@ -15,6 +15,7 @@ pub(crate) fn noise(seed: u64) -> impl FnMut() -> f64 {
 struct Small {
     spline: UniformDesign,
     targets: Mat<f64>,
+    weights: Vec<f64>,
     controls: Mat<f64>,
     sites: Mat<f64>,
     zero: Mat<f64>,
@@ -38,6 +39,7 @@ fn small() -> Small {
     Small {
         spline,
         targets,
+        weights: (0..31).map(|i| 1.0 + (i % 3) as f64).collect(),
         controls: around(9, 1.0),
         sites: around(7, 0.9),
         zero: Mat::zeros(9, 9),
@@ -50,6 +52,7 @@ impl Small {
         Problem {
             spline: &self.spline,
             targets: self.targets.as_ref(),
+            weights: &self.weights,
             anchor: self.controls.as_ref(),
             hold: self.zero.as_ref(),
             bending: self.zero.as_ref(),
@@ -63,7 +66,7 @@ impl Small {
         let (k, l) = (9, 7);
         let controls = Mat::from_fn(k, 2, |i, a| self.controls[(i, a)] + step[a * k + i]);
         let sites = Mat::from_fn(l, 2, |j, a| self.sites[(j, a)] + step[2 * k + a * l + j]);
-        let mut design = Design::new(31, l, 4, ridge);
+        let mut design = Design::new(&self.weights, l, 4, ridge);
         let points = self.spline.apply(controls.as_ref());
         design.solve(points.as_ref(), sites.as_ref(), self.targets.as_ref())
     }
@@ -132,7 +135,8 @@ fn the_hessian_is_that_of_the_explicit_jacobian() {
             }
             plate.at(small.spline.apply(controls.as_ref()).as_ref())
         };
-        let column = (moved(1e-6) - moved(-1e-6)) * faer::Scale(0.5e6);
+        let change = (moved(1e-6) - moved(-1e-6)) * faer::Scale(0.5e6);
+        let column = Mat::from_fn(31, m, |i, c| small.weights[i] * change[(i, c)]);
         let free = &column - &basis * (basis.transpose() * &column);
         for c in 0..m {
             for i in 0..31 {
