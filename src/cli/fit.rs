@@ -6,7 +6,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use serde_json::{Value, json};
 
 use super::args::{Input, positive};
-use super::report::{count, number, percent, table};
+use super::report::{astray, count, number, percent, table};
 use super::session::{Outcome, Session};
 use crate::diag::Result;
 use crate::loom::Loom;
@@ -188,6 +188,7 @@ pub(super) fn summary(session: &Session, title: &str, report: &FitReport) -> Str
             ),
         ));
     }
+    rows.extend(astray(&report.spans));
     let layout = &report.layout;
     rows.push((
         "layout",

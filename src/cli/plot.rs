@@ -54,8 +54,16 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<Outcome> {
     let scene = figure(&map, &signals, &title, args.size, &theme);
     let saved = save_picture(session.world(), &scene, &output, SCALE)?;
     Ok(Outcome {
-        object: json!({ "outputs": report::paths(&saved.outputs), "warnings": [] }),
-        report: report::table(session.style, &args.output.display().to_string(), &[]),
+        object: json!({
+            "outputs": report::paths(&saved.outputs),
+            "spans": loom.report().spans,
+            "warnings": [],
+        }),
+        report: report::table(
+            session.style,
+            &args.output.display().to_string(),
+            &report::astray(&loom.report().spans),
+        ),
         ..Outcome::default()
     })
 }

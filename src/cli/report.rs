@@ -3,7 +3,11 @@
 use std::path::PathBuf;
 
 use super::print::Style;
+use crate::loom::report::Span;
 use crate::pipeline::{Plan, Saved};
+
+/// So many stretches that go astray are listed.
+const ASTRAY: usize = 5;
 
 /// A title and its rows, the values aligned.
 pub(super) fn table(style: Style, title: &str, rows: &[(&str, String)]) -> String {
@@ -54,6 +58,12 @@ pub(super) fn bytes(count: u64) -> String {
 pub(super) fn count(number: usize, one: &str) -> String {
     let plural = if number == 1 { "" } else { "s" };
     format!("{number} {one}{plural}")
+}
+
+/// A row for each stretch of a motion that leaves the way of its frames, the worst first.
+pub(super) fn astray(spans: &[Span]) -> Vec<(&'static str, String)> {
+    let rows = spans.iter().take(ASTRAY);
+    rows.map(|span| ("astray", span.advice())).collect()
 }
 
 /// What was written where.

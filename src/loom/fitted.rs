@@ -135,14 +135,16 @@ fn spans(
         Method::Ch12 => None,
         Method::Ordered => Some(Laid::out(subspace, choice_of(signals), task)?),
     };
-    let fit = |change: Change| -> Result<Signals> {
+    let fit = |change: &Change| -> Result<Signals> {
         let (mut pins, mut sites) = (options.pins.clone(), signals.pose.sites().len());
         match change {
-            Change::Pin { frame, at } => {
-                pins.retain(|pin| pin.frame != frame);
-                pins.push(Pin::at(frame - 1, at));
+            Change::Pins(held) => {
+                for held in held {
+                    pins.retain(|pin| pin.frame != held.frame);
+                    pins.push(Pin::at(held.frame - 1, held.at));
+                }
             }
-            Change::Sites(more) => sites = more,
+            Change::Sites(more) => sites = *more,
         }
         let controls = signals.time.controls().len();
         match &laid {
@@ -153,7 +155,8 @@ fn spans(
             }
         }
     };
-    advice::advise(subspace, signals, &mut spans, &fit)?;
+    let pinned: Vec<usize> = options.pins.iter().map(|pin| pin.frame).collect();
+    advice::advise(subspace, signals, &pinned, &mut spans, &fit)?;
     Ok(spans)
 }
 

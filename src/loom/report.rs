@@ -165,7 +165,7 @@ pub struct Span {
 }
 
 /// A change of the options that would mend a span.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Mend {
     /// What to change.
     pub change: Change,
@@ -174,18 +174,51 @@ pub struct Mend {
 }
 
 /// What to change.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Change {
-    /// Pin this frame (from 1) at this place of the map.
-    Pin {
-        /// The frame.
-        frame: usize,
-        /// The place.
-        at: Point,
-    },
+    /// Pin these frames: the first one away from the strand it lies among, the others where they are, so
+    /// that the map does not simply move along.
+    Pins(Vec<Held>),
     /// Ask for so many sites.
     Sites(usize),
+}
+
+/// A frame and its place in the map.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Held {
+    /// The frame, from 1.
+    pub frame: usize,
+    /// The place.
+    pub at: Point,
+}
+
+impl Span {
+    /// One sentence: which frames, how far off, and the best remedy with what it would leave.
+    pub fn advice(&self) -> String {
+        let (first, last, deviation) = (self.first, self.last, self.deviation);
+        let astray =
+            format!("frames {first}-{last} leave their way by {deviation:.2} of a frame step");
+        match self.mends.first() {
+            Some(mend) => format!("{astray}; {}", mend.advice()),
+            None => astray,
+        }
+    }
+}
+
+impl Mend {
+    /// What to ask for, and how much of the deviation it would leave.
+    pub fn advice(&self) -> String {
+        let change = match &self.change {
+            Change::Sites(sites) => format!("--sites {sites}"),
+            Change::Pins(pins) => {
+                let pin =
+                    |pin: &Held| format!("--pin {}={:.4},{:.4}", pin.frame, pin.at[0], pin.at[1]);
+                pins.iter().map(pin).collect::<Vec<_>>().join(" ")
+            }
+        };
+        format!("`{change}` would leave {:.0} % of it", 100.0 * self.left)
+    }
 }
 
 impl FitReport {

@@ -4,7 +4,7 @@ use super::ch12::Signals;
 use super::fidelity::Fidelity;
 use super::left_out::LeftOutFit;
 use super::ordered::SITES_PER_MODE;
-use super::report::{Change, Errors, Span};
+use super::report::{Errors, Span};
 use super::subspace::Subspace;
 use crate::diag::Diagnostic;
 use crate::math::pca::Basis;
@@ -88,14 +88,9 @@ pub fn of_spans(spans: &[Span]) -> Option<Diagnostic> {
         worst.deviation,
         named.join(", ")
     ));
-    let mends = worst.mends.iter().map(|mend| {
-        let change = match mend.change {
-            Change::Sites(sites) => format!("--sites {sites}"),
-            Change::Pin { frame, at } => format!("--pin {frame}={:.4},{:.4}", at[0], at[1]),
-        };
-        let (first, last, left) = (worst.first, worst.last, 100.0 * mend.left);
-        format!("`{change}` would leave {left:.0} % of it in frames {first}-{last}")
-    });
+    let (first, last) = (worst.first, worst.last);
+    let mends = worst.mends.iter();
+    let mends = mends.map(|mend| format!("{} in frames {first}-{last}", mend.advice()));
     Some(mends.fold(warning, Diagnostic::hint))
 }
 

@@ -5,6 +5,7 @@ use super::picture::save_picture;
 use super::save::Saved;
 use crate::diag::Result;
 use crate::loom::Loom;
+use crate::loom::report::{Change, Span};
 use crate::math::b_spline::Point;
 use crate::plot::{Anchor, PoseSpace, Scene, Theme, TimeSignals, pose_space, time_signals};
 use crate::signal::pose::PoseSignal;
@@ -27,6 +28,9 @@ pub struct Fitted<'a> {
 /// The curve is sampled this often between frames, if it can be afforded.
 const SMOOTH: usize = 24;
 
+/// So many stretches that go astray are told in words.
+const NAMED: usize = 3;
+
 /// Samples of the whole curve: beyond, a picture shows no difference.
 const SAMPLES: usize = 2400;
 
@@ -42,7 +46,22 @@ pub fn plot_loom(loom: &Loom) -> (PoseSpace, TimeSignals) {
         errors: &loom.frame_errors(),
         astray: &astray,
     };
-    series(loom.time(), loom.pose(), &fitted)
+    let (mut map, signals) = series(loom.time(), loom.pose(), &fitted);
+    if map.frames.len() == loom.layout().positions.len() && loom.time().warps().is_empty() {
+        advise(&mut map, &loom.report().spans);
+    }
+    (map, signals)
+}
+
+/// Adds what would mend the worst spans: words, and arrows where that is a pin.
+fn advise(map: &mut PoseSpace, spans: &[Span]) {
+    for span in spans.iter().take(NAMED) {
+        map.notes.push(span.advice());
+        if let Some(Change::Pins(pins)) = span.mends.first().map(|mend| &mend.change) {
+            map.advised
+                .extend(pins.first().map(|pin| (pin.frame, pin.at)));
+        }
+    }
 }
 
 /// Size of the figure in a file, in pixels at scale 1.
@@ -157,7 +176,7 @@ fn knot_times(time: &TimeSignal, times: &[f64], rho: &[f64]) -> Vec<f64> {
 }
 
 /// Map and time signals side by side, or below each other where the picture is higher than wide, under a
-/// line of text (none if it is empty).
+/// line of text (none if it is empty) and the map's notes.
 pub fn figure(
     map: &PoseSpace,
     signals: &TimeSignals,
@@ -166,17 +185,16 @@ pub fn figure(
     theme: &Theme,
 ) -> Scene {
     let mut scene = Scene::new(width, height, theme.background);
-    let top = if title.is_empty() {
-        0.0
-    } else {
-        2.0 * theme.text
-    };
-    scene.write(
-        title,
-        [0.8 * theme.text, 1.4 * theme.text],
-        Anchor::Start,
-        theme,
-    );
+    let lines = std::iter::once(title).chain(map.notes.iter().map(String::as_str));
+    let mut top = 0.0;
+    for line in lines.filter(|line| !line.is_empty()) {
+        let at = [0.8 * theme.text, top + 1.4 * theme.text];
+        scene.write(line, at, Anchor::Start, theme);
+        top += 1.4 * theme.text;
+    }
+    if top > 0.0 {
+        top += 0.6 * theme.text;
+    }
     let tall = height - top;
     let across = width >= tall;
     let first = if across {
@@ -197,6 +215,7 @@ pub fn figure(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::loom::report::{Held, Mend};
     use crate::loom::test_looms::ring;
     use crate::math::thin_plate::Rows;
     use crate::plot::Item;
@@ -261,6 +280,37 @@ mod tests {
         let world = MemoryWorld::new();
         save_plot(&world, &loom, &"a/pose.svg".into(), &Theme::dark()).unwrap();
         assert_eq!(world.paths(), [std::path::Path::new("a/pose.svg")]);
+    }
+
+    #[test]
+    fn what_would_mend_a_span_is_told_and_shown() {
+        let positions = circle(12);
+        let (time, pose) = signals(&positions, 8);
+        let (mut map, plots) = series(&time, &pose, &Fitted::default());
+        let pin = Held {
+            frame: 5,
+            at: [2.0, 2.0],
+        };
+        let mend = Mend {
+            change: Change::Pins(vec![pin]),
+            left: 0.2,
+        };
+        let span = Span {
+            first: 4,
+            last: 6,
+            mends: vec![mend],
+            ..Span::default()
+        };
+        advise(&mut map, &[span]);
+        assert_eq!(map.advised, [(5, [2.0, 2.0])]);
+        let scene = figure(&map, &plots, "title", [900.0, 400.0], &Theme::light());
+        let told = scene.items.iter().any(|item| match item {
+            Item::Text(label) => label
+                .text
+                .contains("`--pin 5=2.0000,2.0000` would leave 20 %"),
+            _ => false,
+        });
+        assert!(told, "{:?}", map.notes);
     }
 
     #[test]

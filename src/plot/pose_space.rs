@@ -37,6 +37,10 @@ pub struct PoseSpace {
     pub span: Option<[f64; 2]>,
     /// Times between which the curve leaves the way of the frames; set off as a warning.
     pub advice: Vec<[f64; 2]>,
+    /// Frames, from 1, that had better be pinned, and where; an arrow leads there.
+    pub advised: Vec<(usize, [f64; 2])>,
+    /// Sentences about the map, for who has room for them.
+    pub notes: Vec<String>,
     /// Small pictures behind everything, cut at the frame: where their middles lie, and how wide they are
     /// in data units.
     pub pictures: Vec<([f64; 2], f64, Arc<Image>)>,
@@ -96,7 +100,9 @@ impl PoseSpace {
     fn points(&self) -> impl Iterator<Item = [f64; 2]> + '_ {
         let pins = self.pins.iter().map(|(_, at)| at);
         let lists = [&self.curve, &self.frames, &self.controls, &self.marked];
-        lists.into_iter().flatten().chain(pins).copied()
+        let advised = self.advised.iter().map(|(_, at)| at);
+        let points = lists.into_iter().flatten().chain(pins);
+        points.chain(advised).copied()
     }
 
     fn time_range(&self) -> Option<[f64; 2]> {
@@ -111,6 +117,7 @@ impl PoseSpace {
             (marks.site, "sites", !self.sites.is_empty()),
             (marks.control, "control points", !self.controls.is_empty()),
             (marks.pin, "pins", !self.pins.is_empty()),
+            (marks.advised, "pins advised", !self.advised.is_empty()),
             (marks.end, "last frame", self.frames.len() > 1),
             (marks.astray, "off the frames’ way", !self.advice.is_empty()),
         ];
@@ -158,6 +165,7 @@ impl PoseSpace {
         for (_, at) in self.pins.iter().filter(|(_, at)| finite(at)) {
             marks.pin.draw(scene, theme, plane.pixel(*at));
         }
+        self.draw_advised(scene, plane, theme);
         self.draw_numbers(scene, plane, theme);
     }
 
@@ -218,6 +226,21 @@ impl PoseSpace {
             colors: steps.iter().map(|(_, t)| color(*t)).collect(),
             width: 2.2 * theme.unit(),
         });
+    }
+
+    /// From a frame to where it had better be pinned.
+    fn draw_advised(&self, scene: &mut Scene, plane: &Plane, theme: &Theme) {
+        let mark = Marks::of(theme).advised;
+        let stroke = Stroke::new(theme.warning(), 1.2 * theme.unit());
+        for &(frame, at) in &self.advised {
+            let Some(from) = self.place(frame).filter(|_| finite(&at)) else {
+                continue;
+            };
+            let ends = [plane.pixel(from), plane.pixel(at)];
+            let dashed = stroke.dashed(4.0 * theme.unit(), 3.0 * theme.unit());
+            scene.stroke(Path::polyline(&ends), dashed);
+            mark.draw(scene, theme, ends[1]);
+        }
     }
 
     fn draw_arrows(&self, scene: &mut Scene, steps: &[(Point, f64)], theme: &Theme) {
@@ -309,7 +332,8 @@ impl PoseSpace {
     fn numbered(&self) -> Vec<usize> {
         let count = self.frames.len();
         let step = nice_step((count as f64 / MOST_NUMBERS).max(1.0)) as usize;
-        let pinned = self.pins.iter().map(|(frame, _)| *frame);
+        let pins = self.advised.iter().chain(&self.pins);
+        let pinned = pins.map(|(frame, _)| *frame);
         let ends = [1, count];
         let every = (step..count).step_by(step.max(1));
         let all = pinned
@@ -333,6 +357,7 @@ struct Marks {
     site: Mark,
     control: Mark,
     pin: Mark,
+    advised: Mark,
     end: Mark,
     astray: Mark,
 }
@@ -345,6 +370,7 @@ impl Marks {
             site: Mark::Ring(theme.series[0]),
             control: Mark::Polygon(theme.series[1]),
             pin: Mark::Diamond(theme.series[3]),
+            advised: Mark::Diamond(theme.warning()),
             end: Mark::Square(theme.ink),
             astray: Mark::Line(theme.warning()),
         }
@@ -586,6 +612,17 @@ mod tests {
                     assert!(boxes[..i].iter().all(|other| !other.intersects(one)));
                 }
             }
+        }
+    }
+
+    #[test]
+    fn advised_pins_are_framed_and_named() {
+        let mut map = spiral(24);
+        map.advised = vec![(14, [60.0, 180.0])];
+        let (scene, plane) = pose_space(&map, 640.0, 400.0, &Theme::light());
+        assert!(plane.area.contains(plane.pixel([60.0, 180.0])));
+        for text in ["pins advised", "14"] {
+            assert!(texts(&scene).any(|label| label.text == text), "{text}");
         }
     }
 

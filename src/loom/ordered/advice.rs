@@ -13,7 +13,7 @@
 
 use crate::diag::Result;
 use crate::loom::ch12::Signals;
-use crate::loom::report::{Change, Mend, Span};
+use crate::loom::report::{Change, Held, Mend, Span};
 use crate::loom::subspace::Subspace;
 use crate::math::b_spline::Point;
 use crate::math::cubic_spline::{CubicSpline, Ends};
@@ -46,15 +46,17 @@ pub fn spans(subspace: &Subspace, signals: &Signals) -> Vec<Span> {
     spans
 }
 
-/// Adds to the worst spans what would mend them; `fit` makes signals under a change of the options.
+/// Adds to the worst spans what would mend them; `fit` makes signals under a change of the options, under
+/// which the frames `pinned` (from 1) are held already.
 ///
 /// # Errors
 /// Those of `fit`.
 pub fn advise(
     subspace: &Subspace,
     signals: &Signals,
+    pinned: &[usize],
     spans: &mut [Span],
-    fit: &dyn Fn(Change) -> Result<Signals>,
+    fit: &dyn Fn(&Change) -> Result<Signals>,
 ) -> Result<()> {
     if spans.is_empty() {
         return Ok(());
@@ -62,15 +64,17 @@ pub fn advise(
     let sites = signals.pose.sites().len();
     let more = (sites + sites.div_ceil(4)).min(subspace.frames);
     let with_more = match more > sites {
-        true => Some(intervals(subspace, &fit(Change::Sites(more))?)),
+        true => Some(intervals(subspace, &fit(&Change::Sites(more))?)),
         false => None,
     };
     for span in spans.iter_mut().take(TREATED) {
         if let Some(after) = &with_more {
             span.consider(Change::Sites(more), after);
         }
-        if let Some(pin) = away(&signals.layout.positions, span) {
-            span.consider(pin, &intervals(subspace, &fit(pin)?));
+        if let Some(pins) = away(&signals.layout.positions, pinned, span) {
+            let change = Change::Pins(pins);
+            let after = intervals(subspace, &fit(&change)?);
+            span.consider(change, &after);
         }
         span.mends.sort_by(|a, b| a.left.total_cmp(&b.left));
     }
@@ -206,24 +210,55 @@ impl Surface {
 }
 
 /// The middle frame of a span, pinned away from the nearest frame of another strand by as much again as
-/// it is near; None where there is no other strand.
-fn away(positions: &[Point], span: &Span) -> Option<Change> {
+/// it is near, and two far frames pinned where they are (fewer where pins hold the map already); None
+/// where there is no other strand, or the frame is pinned.
+fn away(positions: &[Point], pinned: &[usize], span: &Span) -> Option<Vec<Held>> {
     let frame = (span.first + span.last) / 2 - 1;
+    if pinned.contains(&(frame + 1)) {
+        return None;
+    }
     let [x, y] = positions[frame];
-    let apart = |p: &Point| ((p[0] - x).powi(2) + (p[1] - y).powi(2)).sqrt();
     let others = positions.iter().enumerate();
     let (_, nearest) = others
         .filter(|(other, _)| other.abs_diff(frame) > 3 + span.last - span.first)
-        .min_by(|a, b| apart(a.1).total_cmp(&apart(b.1)))?;
-    let size = positions.iter().map(apart).fold(0.0, f64::max);
-    let distance = apart(nearest);
+        .min_by(|a, b| apart(positions[frame], *a.1).total_cmp(&apart(positions[frame], *b.1)))?;
+    let size = positions
+        .iter()
+        .map(|&p| apart(positions[frame], p))
+        .fold(0.0, f64::max);
+    let distance = apart(positions[frame], *nearest);
     let shift = (0.15 * size).max(distance);
     let direction = match distance > 0.0 {
         true => [(x - nearest[0]) / distance, (y - nearest[1]) / distance],
         false => [0.0, 1.0],
     };
-    Some(Change::Pin {
+    let at = [x + shift * direction[0], y + shift * direction[1]];
+    let mut pins = vec![Held {
         frame: frame + 1,
-        at: [x + shift * direction[0], y + shift * direction[1]],
-    })
+        at,
+    }];
+    for _ in pinned.len()..2 {
+        pins.push(farthest(positions, &pins));
+    }
+    Some(pins)
+}
+
+/// The frame that lies farthest from all of `pins`, where it lies.
+fn farthest(positions: &[Point], pins: &[Held]) -> Held {
+    let far = |at: Point| {
+        let distances = pins.iter().map(|pin| apart(positions[pin.frame - 1], at));
+        distances.fold(f64::INFINITY, f64::min)
+    };
+    let farthest =
+        (0..positions.len()).max_by(|&a, &b| far(positions[a]).total_cmp(&far(positions[b])));
+    let frame = farthest.unwrap_or(0);
+    Held {
+        frame: frame + 1,
+        at: positions[frame],
+    }
+}
+
+fn apart(p: Point, q: Point) -> f64 {
+    let (dx, dy) = (p[0] - q[0], p[1] - q[1]);
+    (dx * dx + dy * dy).sqrt()
 }

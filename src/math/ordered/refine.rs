@@ -39,7 +39,7 @@ pub(super) fn firm(frames: usize) -> Round {
 }
 /// While a pin is dragged.
 pub(super) const QUICK: Round = Round {
-    evaluations: 3,
+    evaluations: 2,
     bending: 0.025,
 };
 

@@ -62,6 +62,11 @@ impl Samples {
         Samples::at_rate(frames, if frames.nrows() < SHORT { 4 } else { 2 })
     }
 
+    /// Half as many, for what must be quick.
+    pub(super) fn coarse(frames: MatRef<'_, f64>) -> Self {
+        Samples::at_rate(frames, if frames.nrows() < SHORT { 2 } else { 1 })
+    }
+
     /// The same with `rate` fitted samples an interval.
     pub(super) fn at_rate(frames: MatRef<'_, f64>, rate: usize) -> Self {
         let count = frames.nrows();

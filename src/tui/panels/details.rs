@@ -7,7 +7,6 @@ use ratatui::widgets::{Paragraph, Widget, Wrap};
 
 use super::Panel;
 use crate::loom::Loom;
-use crate::loom::report::{Change, Span};
 use crate::tui::state::State;
 use crate::tui::theme::Role;
 use crate::tui::work::Subject;
@@ -40,7 +39,7 @@ impl Panel for Details {
                     loom.report()
                         .spans
                         .iter()
-                        .map(|span| Line::styled(advice(span), state.look.style(Role::Mark))),
+                        .map(|span| Line::styled(span.advice(), state.look.style(Role::Mark))),
                 )
                 .chain(loom.report().warnings.iter().map(|warning| {
                     Line::styled(format!("warning: {warning}"), state.look.style(Role::Bad))
@@ -50,27 +49,6 @@ impl Panel for Details {
         Paragraph::new(lines)
             .wrap(Wrap { trim: false })
             .render(area, buffer);
-    }
-}
-
-/// Where the curve goes astray, and what would mend it.
-fn advice(span: &Span) -> String {
-    let Span {
-        first,
-        last,
-        deviation,
-        ..
-    } = span;
-    let place = format!("frames {first} to {last}: {deviation:.1} steps off");
-    let Some(mend) = span.mends.first() else {
-        return place;
-    };
-    let left = 100.0 * mend.left;
-    match mend.change {
-        Change::Pin { frame, at: [x, y] } => {
-            format!("{place}; {left:.0} % of it with frame {frame} pinned at {x:.4}, {y:.4}")
-        }
-        Change::Sites(count) => format!("{place}; {left:.0} % of it with {count} sites"),
     }
 }
 
