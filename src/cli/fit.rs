@@ -67,6 +67,10 @@ struct How {
     #[arg(long = "pin", value_name = "FRAME=X,Y", value_parser = pin)]
     pins: Vec<Pin>,
 
+    /// A loom fitted earlier, to nearly the same frames: its choice of a map is kept while it suits
+    #[arg(long, value_name = "F.loom")]
+    near: Option<PathBuf>,
+
     /// Exponent of the time signal's parametrisation, from 0 (uniform) to 1 (by distance)
     #[arg(long, value_name = "A", default_value_t = 0.5)]
     alpha: f64,
@@ -88,13 +92,23 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<Outcome> {
     let output = Output::from(&args.output).protecting(&capture.origin.files);
     pipeline::check_loom_output(session.world(), &output)?;
     let sequence = capture.content.sequence(&session.task)?;
-    let loom = fitted(session, &sequence, &args.how.options())?;
+    let mut options = args.how.options();
+    options.near = match &args.how.near {
+        Some(path) => choice(session.open_loom(path)?.report()),
+        None => None,
+    };
+    let loom = fitted(session, &sequence, &options)?;
     pipeline::save_loom(session.world(), &loom, &output, &session.task)?;
     Ok(Outcome {
         object: report(session, loom.report()),
         report: summary(session, &args.output.display().to_string(), loom.report()),
         ..Outcome::default()
     })
+}
+
+/// (tau, theta) of an ordered fit.
+fn choice(report: &FitReport) -> Option<(f64, f64)> {
+    report.ordered.map(|ordered| (ordered.tau, ordered.theta))
 }
 
 /// Fits and keeps the warnings.

@@ -22,6 +22,8 @@ pub struct FitRequest {
     pub tolerance: Option<f64>,
     /// Frames (from 1) held at points of the layout.
     pub pins: Vec<(usize, [f64; 2])>,
+    /// (tau, theta) of an earlier ordered fit of nearly these frames, kept while it suits.
+    pub near: Option<(f64, f64)>,
     /// Exponent of the parametrisation.
     pub alpha: Option<f64>,
     /// Root motion to split off: none, ground or rigid.
@@ -50,7 +52,7 @@ impl FitRequest {
             tolerance: self.tolerance.unwrap_or(default.tolerance),
             pins: self.pins.iter().map(pin).collect(),
             alpha: self.alpha.unwrap_or(default.alpha),
-            near: None,
+            near: self.near,
             root: self.root.as_deref().map_or(Ok(None), root)?,
             fps: self.fps,
             left_out: default.left_out,

@@ -252,7 +252,7 @@ impl Workbench {
     }
 
     /// The loom fitted again with frame `frame` (from 1) held at `place`, or let go, and its edits done
-    /// again.
+    /// again. The new fit stays near the first: an ordered one keeps its tau and theta.
     ///
     /// # Errors
     /// The loom was loaded: what it was fitted to is not known. Those of the fit and of the edits.
@@ -270,6 +270,8 @@ impl Workbench {
             .err();
         };
         let mut request = source.request.clone();
+        let ordered = loom.loom.value.report().ordered;
+        request.near = ordered.map(|ordered| (ordered.tau, ordered.theta));
         request.pins.retain(|(pinned, _)| *pinned != frame);
         request.pins.extend(place.map(|place| (frame, place)));
         let mut warned = self.fit(&source.frames, &request)?;

@@ -251,7 +251,7 @@ fn weights(frames: usize, rate: usize) -> Vec<f64> {
     let rows = rate * (frames - 1) + 1;
     let squares = KNOWN * KNOWN * frames as f64 + (rows - frames) as f64;
     let scale = (rows as f64 / squares).sqrt();
-    let weight = |row: usize| if row % rate == 0 { KNOWN } else { 1.0 };
+    let weight = |row: usize| if row.is_multiple_of(rate) { KNOWN } else { 1.0 };
     (0..rows).map(|row| scale * weight(row)).collect()
 }
 

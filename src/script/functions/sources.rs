@@ -78,6 +78,7 @@ fn request(options: Map) -> Raw<FitRequest> {
         modes: options.count("modes", 0)?,
         tolerance: options.number("tolerance")?,
         pins: pins.unwrap_or_default(),
+        near: None,
         alpha: options.number("alpha")?,
         root: options.word("root")?,
         fps: options.number("fps")?,
