@@ -377,6 +377,37 @@ mod tests {
     }
 
     #[test]
+    fn every_rate_gives_the_frames_that_the_duration_holds() {
+        // as fractions, so that the counts are exact: 23.976 stands for 24000/1001, and so on
+        let rates: [(u64, u64); 9] = [
+            (24_000, 1001),
+            (24, 1),
+            (25, 1),
+            (30_000, 1001),
+            (30, 1),
+            (48, 1),
+            (50, 1),
+            (60_000, 1001),
+            (60, 1),
+        ];
+        for (from, from_by) in rates {
+            for (to, to_by) in rates {
+                for n in [1, 2, 24, 49, 1001, 1002] {
+                    let fps = from as f64 / from_by as f64;
+                    let wanted = to as f64 / to_by as f64;
+                    let sampling = Times::PerSecond(wanted).over(n, Some(fps)).unwrap();
+                    // floor((n - 1) r / fps) + 1 in whole numbers
+                    let spans = (n as u64 - 1) * to * from_by / (to_by * from);
+                    assert_eq!(sampling.times.len() as u64, spans + 1, "{n} {fps} {wanted}");
+                    let last = sampling.times[sampling.times.len() - 1];
+                    assert!(last <= n as f64 && last > n as f64 - fps / wanted - 1e-6);
+                    assert_eq!((sampling.times[0], sampling.fps), (1.0, Some(wanted)));
+                }
+            }
+        }
+    }
+
+    #[test]
     fn what_is_outside_is_an_error_that_names_the_bound() {
         for (text, frames) in [("0.5", 24), ("1,25", 24), ("1:24.5:0.5", 24), ("0:3:1", 24)] {
             let error = text

@@ -10,8 +10,18 @@ use meshloom::loom::fit::{FitOptions, fit};
 use meshloom::mesh::{Sequence, Topology};
 use meshloom::task::Task;
 
-/// A capture's frames as points, fitted with k, l, m; none where there are no captures.
+/// A capture's frames as points, fitted the paper's way with k, l, m; none where there are no captures.
 fn fitted(name: &str, (k, l, m): (usize, usize, usize)) -> Option<Loom> {
+    let options = FitOptions {
+        controls: Some(k),
+        sites: Some(l),
+        modes: Some(m),
+        ..FitOptions::ch12()
+    };
+    fitted_with(name, options)
+}
+
+fn fitted_with(name: &str, options: FitOptions) -> Option<Loom> {
     let data = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data"));
     let Ok(bytes) = fs::read(data.join(name).join("frames.pc2")) else {
         println!("skipped: no real captures");
@@ -25,11 +35,8 @@ fn fitted(name: &str, (k, l, m): (usize, usize, usize)) -> Option<Loom> {
     let points = Topology::from_triangles(vertices, &[]).expect("no faces, no faults");
     let sequence = Sequence::new(Arc::new(points), positions.collect(), Some(24.0));
     let options = FitOptions {
-        controls: Some(k),
-        sites: Some(l),
-        modes: Some(m),
         left_out: false,
-        ..FitOptions::ch12()
+        ..options
     };
     let fitted = fit(&sequence, &options, &Task::default()).expect("the capture is sound");
     Some(fitted.output)
@@ -71,6 +78,26 @@ fn loops_of_real_captures_show_no_seam() {
                 );
             }
         }
+    }
+}
+
+#[test]
+fn loops_of_ordered_fits_show_no_seam() {
+    for (name, from, to) in [
+        ("flag", 30.0, 48.0),
+        ("flag", 18.0, 107.0),
+        ("horse-gallop", 10.0, 40.0),
+        ("horse-gallop", 8.0, 25.0),
+    ] {
+        let Some(loom) = fitted_with(name, FitOptions::default()) else {
+            return;
+        };
+        let looped = add_loop(&loom, from, to, 1, None).expect("the loop lies within");
+        let (bridge, seam) = (looped.bridge, looped.seam);
+        assert!(
+            seam.worst() <= 1.5,
+            "{name} {from}..{to}: {bridge} {seam:?}"
+        );
     }
 }
 

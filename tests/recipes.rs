@@ -305,6 +305,99 @@ fn endless_and_greedy_recipes_end() {
 }
 
 #[test]
+fn native_results_have_a_limit_of_their_own() {
+    outcome(
+        "let loom = fit(demo(\"bar\"), #{ tolerance: 0.05 });\nloom.resample(frames(1000000))",
+        "",
+    )
+    .fails_with(&["r.rhai:2:", "more than 8 GiB", "sample fewer frames"]);
+}
+
+#[test]
+fn times_outside_of_a_loom_are_refused_with_its_range() {
+    for edit in [
+        "add_loop(0.5, 5)",
+        "add_loop(3, 99)",
+        "add_loop(5, 5)",
+        "at(12.5)",
+        "hold(0, 3)",
+    ] {
+        let recipe = format!("let a = fit(input(), #{{ tolerance: 0.05 }});\na.{edit}");
+        outcome(&recipe, "").fails_with_any(&["r.rhai:2:"]);
+    }
+    outcome("fit(input(), #{ tolerance: 0.05 }).add_loop(3, 99)", "").fails_with(&["[1, 12]"]);
+}
+
+#[test]
+fn examples_that_do_not_fit_are_refused() {
+    let loom = "let a = fit(input(), #{ tolerance: 0.05 });\n";
+    let with = |rest: &str| outcome(&format!("{loom}{rest}"), "");
+    with("a.transfer(examples([a.at(1), a.at(4)], [a.at(1)]))")
+        .fails_with(&["r.rhai:2:", "2 source examples and 1 target examples"]);
+    with("a.transfer(examples([a.at(1), a.at(1)], [a.at(1), a.at(4)]))")
+        .fails_with_any(&["all source examples are the reference pose"]);
+    with("a.transfer(examples(demo(\"cactus\"), demo(\"cactus\")))")
+        .fails_with(&["other faces than the loom"]);
+    with("a.transfer(examples([a.at(1), 3], [a.at(1), a.at(4)]))")
+        .fails_with_any(&["item 2 of the array"]);
+    // two examples of a motion with more modes: what they do not span is told
+    let told = with("a.transfer(examples([a.at(1), a.at(6)], [a.at(1), a.at(6)]))").done();
+    assert!(
+        told.stderr.contains("outside of what the examples span"),
+        "{}",
+        told.stderr
+    );
+}
+
+#[test]
+fn maps_from_scratch_say_what_is_wrong_with_them() {
+    let poses = "let c = demo(\"cactus\");\n";
+    let with = |rest: &str| outcome(&format!("{poses}{rest}"), "");
+    with("pose_map([[c.frame(1), [0, 0]], [c.frame(2), [0, 0]]])")
+        .fails_with(&["r.rhai:2:", "poses 1 and 2 have the same place"]);
+    with("pose_map([[c.frame(1), [0]]])").fails_with_any(&["must be [x, y]"]);
+    with("pose_map([c.frame(1)])").fails_with_any(&["a pose [mesh, [x, y]]"]);
+    with("pose_map([])").fails_with_any(&["r.rhai:2:"]);
+    with("pose_map([[c.frame(1), [0, 0]], [demo(\"bar\").frame(1), [1, 0]]])")
+        .fails_with_any(&["shape 2 has"]);
+    with("pose_map([[c.frame(1), [0, 0]]]).add_pose(demo(\"bar\").frame(1))")
+        .fails_with(&["the mesh has other faces than the loom"]);
+    with("pose_map([[c.frame(1), [0, 0]], [c.frame(2), [1, 0]]]).path([[0, 0]], #{ curve: \"round\" })")
+        .fails_with(&["no curve `round`", "controls"]);
+}
+
+#[test]
+fn a_transfer_keeps_the_loops_made_before_it() {
+    let recipe = "
+        let a = fit(input(), #{ controls: 10, sites: 9, modes: 3 });
+        let shapes = [a.at(1), a.at(3), a.at(6), a.at(9)];
+        let pairs = examples(shapes, shapes);
+        let looped = a.add_loop(4, 8, #{ times: 2, bridge: 2 });
+        let there = looped.transfer(pairs);
+        check(there.frames == looped.frames && there.frames > a.frames, \"the loop is kept\");
+        check(compare(there, looped).max < 1e-5, \"onto itself it is the same motion\");
+        let after = a.transfer(pairs).add_loop(4, 8, #{ times: 2, bridge: 2 });
+        check(after.frames == there.frames, \"either way round\");";
+    outcome(recipe, "").done();
+}
+
+#[test]
+fn a_disk_that_fills_up_keeps_earlier_outputs() {
+    let folder = kitchen("save(input(), \"copy/f_##.obj\");\nfit(input(), #{ tolerance: 0.05 })");
+    meshloom(folder.path(), "run r.rhai sheet -o out").done();
+    let before = everything(&folder.path().join("out"));
+    sheet(40, 3).write_objs(&folder.path().join("big"));
+    let binary = env!("CARGO_BIN_EXE_meshloom");
+    let mut shell = std::process::Command::new("sh");
+    // files may not grow beyond a block: the disk is as good as full
+    let line = format!("trap '' XFSZ; ulimit -f 8; exec '{binary}' run r.rhai big -o out");
+    shell.current_dir(folder.path()).args(["-c", &line]);
+    shell.env("MESHLOOM_CACHE", folder.path().join(".cache"));
+    run(shell).fails_with_any(&["out"]);
+    assert_eq!(everything(&folder.path().join("out")), before);
+}
+
+#[test]
 fn what_is_no_recipe_is_refused() {
     let folder = kitchen("");
     meshloom(folder.path(), "run r.rhai").fails_with(&["the recipe is empty"]);
@@ -319,6 +412,10 @@ fn what_is_no_recipe_is_refused() {
 #[test]
 fn stock_recipes_run() {
     let folder = kitchen("");
+    let four = sheet(5, 4);
+    for side in ["sources", "targets"] {
+        four.write_objs(&folder.path().join(side));
+    }
     let list = meshloom(folder.path(), "run --list --json").done().object();
     for entry in list.as_array().unwrap() {
         let name = entry["name"].as_str().unwrap();
@@ -327,6 +424,8 @@ fn stock_recipes_run() {
             "slow-motion" => "--set from=3 --set to=8 --set tolerance=0.05",
             "frame-rate" => "--set rate=60 --fps 24 --set tolerance=0.05",
             "quality-gate" => "--set tolerance=0.05 --set between=50",
+            "transfer" => "--set sources=sources --set targets=targets --set tolerance=0.05",
+            "from-scratch" => "--set frames=30",
             _ => "--set tolerance=0.05",
         };
         let run = meshloom(
@@ -336,6 +435,13 @@ fn stock_recipes_run() {
         assert_eq!(run.code, Some(0), "{name}: {}", run.stderr);
     }
     assert!(folder.path().join("out/contact-sheet/sheet.png").exists());
+    assert!(
+        folder
+            .path()
+            .join("out/from-scratch/frame_0030.obj")
+            .exists()
+    );
+    assert!(folder.path().join("out/transfer/frame_0012.obj").exists());
     // 12 frames at 24 fps are 11/24 s: 27 frames and a half at 60.
     assert_eq!(
         fs::read_dir(folder.path().join("out/frame-rate"))

@@ -2,11 +2,14 @@
 //! asked.
 
 use std::io::{self, IsTerminal};
+use std::path::Path;
 
 use serde_json::{Value, json};
 
+use super::runs::cache_folder;
 use super::session::{Outcome, Session};
 use crate::diag::Result;
+use crate::io::listing;
 use crate::tui;
 
 /// Say what this machine and this terminal offer
@@ -43,7 +46,18 @@ fn machine(session: &Session) -> Facts {
         ("cores", json!(threads.cores)),
         ("threads", json!(rayon::current_num_threads())),
         ("threads_from", json!(threads.from)),
+        ("cache", json!(cache_folder())),
+        (
+            "cache_bytes",
+            json!(cache_folder().map(|folder| held(&folder))),
+        ),
     ]
+}
+
+/// Bytes of all files in a folder: what is remembered there.
+fn held(folder: &Path) -> u64 {
+    let listed = listing(folder, Path::new("")).unwrap_or_default();
+    listed.iter().map(|(_, length, _)| length).sum()
 }
 
 /// What fitting can use of the processor: results of `fit` may differ in the last bits between two

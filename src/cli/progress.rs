@@ -2,6 +2,7 @@
 //! phases and counts its steps, here they are stamped and shown.
 
 use std::io::{self, IsTerminal};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -73,6 +74,13 @@ impl Progress {
         }
     }
 
+    /// Takes the bar away until the next phase.
+    pub(super) fn rest(&self) {
+        if let View::Bar(bar) = &self.view {
+            bar.rest();
+        }
+    }
+
     /// Seconds of each of `names`, in that order, and `total` since the start. Phases that did not
     /// happen took 0.
     pub(super) fn seconds(&self, names: &[&str]) -> Value {
@@ -131,25 +139,42 @@ impl Observer for Progress {
 /// A bar that comes late: work that is done before shows none.
 struct Bar {
     bar: ProgressBar,
-    ended: Arc<Mutex<bool>>,
+    /// How often the bar went away; whoever wanted it to come before that is too late.
+    gone: Arc<Mutex<u64>>,
+    /// Nothing is being done until the next phase.
+    rests: AtomicBool,
 }
 
 impl Bar {
     fn begin() -> Self {
-        let (bar, ended) = (ProgressBar::hidden(), Arc::<Mutex<bool>>::default());
-        let (late, over) = (bar.clone(), Arc::clone(&ended));
+        let bar = Bar {
+            bar: ProgressBar::hidden(),
+            gone: Arc::default(),
+            rests: AtomicBool::new(false),
+        };
+        bar.come();
+        bar
+    }
+
+    /// Shows itself after a while, unless it goes away before.
+    fn come(&self) {
+        let (late, gone) = (self.bar.clone(), Arc::clone(&self.gone));
+        let count = |gone: &Mutex<u64>| *gone.lock().unwrap_or_else(PoisonError::into_inner);
+        let now = count(&gone);
         thread::spawn(move || {
             thread::sleep(BAR_AFTER);
-            let over = over.lock().unwrap_or_else(PoisonError::into_inner);
-            if !*over {
+            let gone = gone.lock().unwrap_or_else(PoisonError::into_inner);
+            if *gone == now {
                 late.set_draw_target(ProgressDrawTarget::stderr());
                 late.enable_steady_tick(TICK);
             }
         });
-        Bar { bar, ended }
     }
 
     fn phase(&self, name: &'static str, steps: usize) {
+        if self.rests.swap(false, Ordering::SeqCst) {
+            self.come();
+        }
         let template = if steps == 0 {
             "{spinner} {msg} {elapsed}"
         } else {
@@ -163,8 +188,15 @@ impl Bar {
         self.bar.set_message(name);
     }
 
+    fn rest(&self) {
+        if !self.rests.swap(true, Ordering::SeqCst) {
+            self.end();
+            self.bar.set_draw_target(ProgressDrawTarget::hidden());
+        }
+    }
+
     fn end(&self) {
-        *self.ended.lock().unwrap_or_else(PoisonError::into_inner) = true;
+        *self.gone.lock().unwrap_or_else(PoisonError::into_inner) += 1;
         self.bar.finish_and_clear();
     }
 }

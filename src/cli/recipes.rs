@@ -26,7 +26,22 @@ pub(super) const STOCK: &[(&str, &str)] = &[
         "quality-gate",
         include_str!("../../scripts/quality-gate.rhai"),
     ),
+    ("transfer", include_str!("../../scripts/transfer.rhai")),
+    (
+        "from-scratch",
+        include_str!("../../scripts/from-scratch.rhai"),
+    ),
 ];
+
+/// The folder to watch for a recipe that may change; none for a stock recipe.
+pub(super) fn folder(path: &Path) -> Option<PathBuf> {
+    let stock = STOCK.iter().any(|(name, _)| Path::new(name) == path);
+    match path.parent() {
+        Some(folder) if folder != Path::new("") => Some(folder.to_path_buf()),
+        _ if stock && !path.exists() => None,
+        _ => Some(PathBuf::from(".")),
+    }
+}
 
 /// The recipe of that file, or the stock recipe of that name; a file goes first.
 ///

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use serde_json::{Value as Json, json};
 
@@ -16,6 +16,7 @@ use crate::diag::{Result, Severity};
 use crate::io::{Depth, Disk, Wake, Watch};
 use crate::recipe::{self, Input, Param, Request};
 use crate::task::Task;
+use crate::world::World;
 
 /// A save is taken for finished when nothing has changed for this long: editors that truncate and write,
 /// or save twice in a row, are one save.
@@ -213,6 +214,7 @@ fn live(args: &Args, path: &Path, runs: &Runs, session: &Session) -> Result<Outc
     loop {
         let watch = session.keep(Watch::new(&folders(&reads), false)?);
         let task = session.task.sibling();
+        let begun = SystemTime::now();
         let (result, interrupted) = std::thread::scope(|scope| {
             let run = scope.spawn(|| once(args, path, runs, &task));
             let interrupted = changed(&watch, &reads, LOOK, || run.is_finished());
@@ -223,6 +225,7 @@ fn live(args: &Args, path: &Path, runs: &Runs, session: &Session) -> Result<Outc
         });
         // A panic in a run has printed itself; the next save runs again.
         let Ok(run) = result else { continue };
+        session.progress.rest();
         show(session, path, &run);
         let watch = if run.reads == reads {
             watch
@@ -230,7 +233,8 @@ fn live(args: &Args, path: &Path, runs: &Runs, session: &Session) -> Result<Outc
             session.keep(Watch::new(&folders(&run.reads), false)?)
         };
         reads = run.reads;
-        if !interrupted {
+        // What was saved before it was watched has to be asked for.
+        if !interrupted && !saved_since(&reads, begun) {
             changed(&watch, &reads, WAIT, || false);
         }
         watch.calm(QUIET, PATIENCE, &mut BTreeSet::new());
@@ -302,6 +306,17 @@ fn changed(watch: &Watch, files: &[PathBuf], look: Duration, ended: impl Fn() ->
             Wake::Quiet => {}
         }
     }
+}
+
+/// Whether one of `files` was written between `begun` and now.
+fn saved_since(files: &[PathBuf], begun: SystemTime) -> bool {
+    let since_1970 = |time: SystemTime| time.duration_since(UNIX_EPOCH).unwrap_or_default();
+    let run = since_1970(begun)..=since_1970(SystemTime::now());
+    files.iter().any(|file| {
+        let found = Disk.identity(file).ok().flatten();
+        let modified = found.and_then(|found| found.modified);
+        modified.is_some_and(|modified| run.contains(&modified))
+    })
 }
 
 /// The folders that hold `files`; folders among them are watched themselves.

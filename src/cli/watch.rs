@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use serde_json::{Value as Json, json};
 
 use super::args::positive;
+use super::print;
 use super::recipes;
 use super::report;
 use super::run::setting;
@@ -18,7 +19,7 @@ use crate::diag::{Diagnostic, Result, Severity};
 use crate::inbox::{Ending, Entry, Inbox, Job, Listed, Rules, State};
 use crate::io::{Depth, Disk, Outbox, Wake, Watch, listing};
 use crate::pipeline::{InputSpec, Key};
-use crate::recipe::{Input, Recipe, Request};
+use crate::recipe::{self, Input, Recipe, Request};
 use crate::task::Task;
 use crate::world::World;
 
@@ -88,16 +89,14 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<Outcome> {
     };
     runs.check(&recipe, &request)?;
     let outbox = Outbox::open(&args.output)?;
-    let watch = session.keep(Watch::new(
-        &[(args.folder.clone(), Depth::Tree)],
-        args.poll,
-    )?);
+    let watch = Looked::new(args, session)?;
     let workers = session.threads.count.max(1);
     let rules = Rules {
         settle: Duration::from_secs_f64(args.settle),
         workers,
     };
-    let inbox = Inbox::new(rules, recipe_key(&recipe, args), journal(&outbox)?);
+    let key = recipe_key(&recipe, args);
+    let inbox = Inbox::new(rules, key.clone(), journal(&outbox)?);
     let (ended, ends) = mpsc::channel();
     let shop = Shop {
         args,
@@ -110,6 +109,7 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<Outcome> {
         shop: &shop,
         inbox,
         recipe,
+        key,
         ends,
         counts: BTreeMap::new(),
         states: BTreeMap::new(),
@@ -120,7 +120,7 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<Outcome> {
             let results = shop.outbox.folder();
             watcher.studio = Some(Studio::open(&args.folder, results, session));
         }
-        let watched = watcher.run(scope, &watch);
+        let watched = watcher.run(scope, watch);
         watcher
             .studio
             .take()
@@ -151,12 +151,68 @@ struct Shop<'a> {
     ended: Sender<(String, Result<Json>)>,
 }
 
+/// A watch on the folder that captures land in, on the folder above it (it may vanish and return) and on
+/// the recipe's.
+struct Looked {
+    watch: Watch,
+    /// Which folder it was: another one of the same name is not watched.
+    node: Option<(u64, u64)>,
+}
+
+impl Looked {
+    fn new(args: &Args, session: &Session) -> Result<Self> {
+        let node = Self::node(args);
+        let mut folders = vec![(args.folder.clone(), Depth::Tree)];
+        let whole = Disk.resolve(&args.folder)?;
+        let above = whole.parent().map(Path::to_path_buf);
+        let beside = above.into_iter().chain(recipes::folder(&args.recipe));
+        for folder in beside {
+            if Disk.resolve(&folder)? != whole && Disk.list(&folder).is_ok() {
+                folders.push((folder, Depth::Entries));
+            }
+        }
+        let watched = Watch::new(&folders, args.poll)?;
+        for warning in &watched.warnings {
+            tell(args, session, warning);
+        }
+        let watch = watched.output;
+        Ok(Looked { watch, node })
+    }
+
+    /// Watches the folder that is there now, if it is another one. One that cannot be watched is listed now
+    /// and then all the same.
+    fn renew(&mut self, args: &Args, session: &Session) {
+        let node = Self::node(args);
+        if node.is_some()
+            && node != self.node
+            && let Ok(looked) = Looked::new(args, session)
+        {
+            *self = looked;
+        }
+    }
+
+    fn node(args: &Args) -> Option<(u64, u64)> {
+        let found = Disk.identity(&args.folder).ok().flatten();
+        found.and_then(|folder| folder.node)
+    }
+}
+
+/// Tells at once what should be known: a watch may never end. The studio has the terminal to itself.
+fn tell(args: &Args, session: &Session, warning: &Diagnostic) {
+    if args.studio {
+        return session.warn(std::slice::from_ref(warning));
+    }
+    print::people(&session.style.diagnostic(warning));
+    session.event(&json!({ "event": "warning", "warning": warning }));
+}
+
 /// The loop that lists, starts and writes down.
 struct Watcher<'a> {
     session: &'a Session,
     shop: &'a Shop<'a>,
     inbox: Inbox,
     recipe: Recipe,
+    key: String,
     ends: Receiver<(String, Result<Json>)>,
     counts: BTreeMap<&'static str, usize>,
     states: BTreeMap<String, State>,
@@ -167,7 +223,7 @@ impl<'a> Watcher<'a> {
     fn run<'scope>(
         &mut self,
         scope: &'scope std::thread::Scope<'scope, '_>,
-        watch: &Watch,
+        mut watch: Looked,
     ) -> Result<()>
     where
         'a: 'scope,
@@ -180,9 +236,14 @@ impl<'a> Watcher<'a> {
             // What seems to have settled is listed once more before it is taken: events get lost.
             let due = look || self.inbox.wakes().is_some_and(|at| at <= begun.elapsed());
             if age >= RELIST || due && age >= BREATH {
+                watch.renew(self.shop.args, self.session);
                 self.list(begun.elapsed());
                 self.reload();
                 (listed, look) = (Some(Instant::now()), false);
+            }
+            // Ends first: what has ended makes room for what waits.
+            while let Ok((name, result)) = self.ends.try_recv() {
+                self.end(&name, result)?;
             }
             while let Some(job) = self.inbox.next_job() {
                 let (shop, recipe, task) =
@@ -190,9 +251,6 @@ impl<'a> Watcher<'a> {
                 scope.spawn(move || shop.work(job, &recipe, &task));
             }
             self.tell_states();
-            while let Ok((name, result)) = self.ends.try_recv() {
-                self.end(&name, result)?;
-            }
             if self.shop.args.once && self.inbox.is_drained() {
                 return Ok(());
             }
@@ -204,8 +262,8 @@ impl<'a> Watcher<'a> {
                 studio.show(&self.inbox);
                 wait = wait.min(GLANCE);
             }
-            if let Wake::Changed(_) = watch.wait(wait) {
-                watch.calm(GATHER, BREATH, &mut Default::default());
+            if let Wake::Changed(_) = watch.watch.wait(wait) {
+                watch.watch.calm(GATHER, BREATH, &mut Default::default());
                 look = true;
             }
         }
@@ -221,6 +279,9 @@ impl<'a> Watcher<'a> {
             .inbox
             .wakes()
             .map_or(RELIST, |at| at.saturating_sub(now));
+        if !running {
+            self.session.progress.rest();
+        }
         let longest = if running || look { LOOK } else { RELIST };
         settles.clamp(LOOK.min(longest), longest)
     }
@@ -248,9 +309,10 @@ impl<'a> Watcher<'a> {
         let Ok(recipe) = recipes::find(self.session.world(), &self.shop.args.recipe) else {
             return;
         };
-        if recipe.text != self.recipe.text && self.shop.runs.check(&recipe, &request).is_ok() {
-            self.inbox.set_recipe(recipe_key(&recipe, self.shop.args));
-            self.recipe = recipe;
+        let key = recipe_key(&recipe, self.shop.args);
+        if key != self.key && self.shop.runs.check(&recipe, &request).is_ok() {
+            self.inbox.set_recipe(key.clone());
+            (self.recipe, self.key) = (recipe, key);
         }
     }
 
@@ -275,7 +337,10 @@ impl<'a> Watcher<'a> {
         if let Some(entry) = self.inbox.ended(name, ending) {
             let line = serde_json::to_string(&entry)
                 .map_err(|error| Diagnostic::error(error.to_string()))?;
-            self.shop.outbox.append(&line)?;
+            // Without its line a capture that is done still has its report; one that failed is tried again.
+            if let Err(error) = self.shop.outbox.append(&line) {
+                tell(self.shop.args, self.session, &error);
+            }
         }
         *self
             .counts
@@ -291,20 +356,24 @@ impl<'a> Watcher<'a> {
 
     /// Tells people and scripts when a capture begins to settle, queues, or starts.
     fn tell_states(&mut self) {
-        let now: BTreeMap<String, State> = self
-            .inbox
-            .states()
-            .map(|(name, state)| (name.to_string(), state))
-            .collect();
-        for (name, state) in &now {
-            let news = self.states.get(name) != Some(state)
-                && matches!(state, State::Settling | State::Queued | State::Running);
-            if news {
+        for (name, state) in self.inbox.states() {
+            if self.states.get(name) == Some(&state) {
+                continue;
+            }
+            self.states.insert(name.to_string(), state);
+            if matches!(state, State::Settling | State::Queued | State::Running) {
                 self.session
                     .event(&json!({ "event": state, "capture": name }));
             }
         }
-        self.states = now;
+        if self.states.len() > self.inbox.states().count() {
+            let known: BTreeMap<String, State> = self
+                .inbox
+                .states()
+                .map(|(name, state)| (name.to_string(), state))
+                .collect();
+            self.states = known;
+        }
     }
 }
 
@@ -402,13 +471,30 @@ pub(super) fn frames_of(folder: &Path, inputs: &[PathBuf]) -> InputSpec {
     }
 }
 
-/// The hash of a recipe with its parameters.
+/// The hash of a recipe with its modules and parameters.
 fn recipe_key(recipe: &Recipe, args: &Args) -> String {
-    Key::of("watch")
+    let mut modules = BTreeMap::new();
+    let folder = recipe.path.parent().unwrap_or(Path::new(""));
+    collect_modules(folder, &recipe.text, &mut modules);
+    let key = Key::of("watch")
         .text(&recipe.text)
         .text(&format!("{:?}", args.set))
-        .finish()
-        .to_string()
+        .text(&format!("{modules:?}"));
+    key.finish().to_string()
+}
+
+/// The texts of the modules that a script imports, and of those that these do.
+fn collect_modules(folder: &Path, text: &str, modules: &mut BTreeMap<PathBuf, String>) {
+    for name in recipe::text::imports(text) {
+        let file = folder.join(name).with_extension("rhai");
+        let Ok(bytes) = Disk.read(&file) else {
+            continue;
+        };
+        let text = String::from_utf8_lossy(&bytes).into_owned();
+        if modules.insert(file, text.clone()).is_none() {
+            collect_modules(folder, &text, modules);
+        }
+    }
 }
 
 /// What was done before: the journal, and what published results say of themselves, in case the journal's

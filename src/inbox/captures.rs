@@ -63,12 +63,17 @@ pub fn captures(files: &[Listed]) -> BTreeMap<String, Capture> {
             Role::Mesh(name) => meshes.push((name, file)),
             Role::Part { capture, input } => {
                 let capture = found.entry(capture).or_default();
-                if !capture.inputs.contains(&input) {
+                // the files of a folder have one input between them
+                if capture.inputs.last() != Some(&input) {
                     capture.inputs.push(input);
                 }
                 capture.files.push(file.clone());
             }
         }
+    }
+    for capture in found.values_mut() {
+        capture.inputs.sort_by_cached_key(|input| place(input));
+        capture.inputs.dedup();
     }
     for (name, file) in meshes {
         if let Some(capture) = found.get_mut(&name) {
@@ -85,6 +90,15 @@ pub fn captures(files: &[Listed]) -> BTreeMap<String, Capture> {
         }
     }
     found
+}
+
+/// Where a file of a group comes in it: by its number (without leading zeros, the shorter first), then by
+/// its name.
+fn place(path: &Path) -> (usize, String, PathBuf) {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let name = stem.trim_end_matches(|c: char| c.is_ascii_digit());
+    let number = stem[name.len()..].trim_start_matches('0').to_string();
+    (number.len(), number, path.to_path_buf())
 }
 
 enum Role {
@@ -184,6 +198,35 @@ mod tests {
             found["wave"].inputs,
             [PathBuf::from("wave.pc2"), PathBuf::from("wave.obj")]
         );
+    }
+
+    #[test]
+    fn frames_of_a_group_are_in_the_order_of_their_numbers() {
+        let files = [
+            "run_10.obj",
+            "run_9.obj",
+            "run_011.obj",
+            "run_100.obj",
+            "run_1.obj",
+        ];
+        let found = captures(&files.map(listed));
+        let wanted = [
+            "run_1.obj",
+            "run_9.obj",
+            "run_10.obj",
+            "run_011.obj",
+            "run_100.obj",
+        ];
+        assert_eq!(found["run"].inputs, wanted.map(PathBuf::from));
+    }
+
+    #[test]
+    fn a_hundred_thousand_files_are_one_capture() {
+        let name = |i: usize| listed(&format!("run_{:06}.obj", (i * 7919) % 100_000));
+        let files: Vec<Listed> = (0..100_000).map(name).collect();
+        let found = captures(&files);
+        assert_eq!(found["run"].inputs.len(), 100_000);
+        assert_eq!(found["run"].inputs[4242], PathBuf::from("run_004242.obj"));
     }
 
     #[test]

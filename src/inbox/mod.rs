@@ -7,7 +7,7 @@
 
 mod captures;
 
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
@@ -80,6 +80,14 @@ struct Seen {
     capture: Capture,
     fingerprint: String,
     since: Duration,
+    /// Whether it waits in the queue.
+    queued: bool,
+}
+
+impl Seen {
+    fn is_settled(&self, now: Duration, settle: Duration) -> bool {
+        self.capture.declared_done || now.saturating_sub(self.since) >= settle
+    }
 }
 
 /// The state of a watched folder.
@@ -122,56 +130,42 @@ impl Inbox {
 
     /// Takes a complete listing of the folder at time `now`.
     pub fn observe(&mut self, files: &[Listed], now: Duration) {
-        let found = captures(files);
-        let gone: BTreeSet<String> = self
-            .seen
-            .keys()
-            .filter(|name| !found.contains_key(*name))
-            .cloned()
-            .collect();
-        self.seen.retain(|name, _| !gone.contains(name));
-        for (name, capture) in found {
+        let mut before = std::mem::take(&mut self.seen);
+        for (name, capture) in captures(files) {
             let fingerprint = capture.fingerprint();
-            let since = match self.seen.get(&name) {
-                Some(seen) if seen.fingerprint == fingerprint => seen.since,
-                _ => now,
+            let former = before.remove(&name);
+            let same = former
+                .as_ref()
+                .filter(|seen| seen.fingerprint == fingerprint);
+            let seen = Seen {
+                since: same.map_or(now, |seen| seen.since),
+                queued: former.as_ref().is_some_and(|seen| seen.queued),
+                capture,
+                fingerprint,
             };
-            self.seen.insert(
-                name,
-                Seen {
-                    capture,
-                    fingerprint,
-                    since,
-                },
-            );
+            self.seen.insert(name, seen);
         }
-        self.queue.retain(|name| !gone.contains(name));
         self.settle(now);
     }
 
     /// Lets time pass without a new listing.
     pub fn settle(&mut self, now: Duration) {
+        let settle = self.rules.settle;
         let mut due: Vec<(Duration, String)> = Vec::new();
         for (name, seen) in &self.seen {
-            let settled =
-                seen.capture.declared_done || now.saturating_sub(seen.since) >= self.rules.settle;
-            if settled
-                && self.is_due(name, seen)
-                && !self.queue.contains(name)
-                && !self.running.contains_key(name)
-            {
+            let waits = seen.queued || self.running.contains_key(name);
+            if !waits && seen.is_settled(now, settle) && self.is_due(name, seen) {
                 due.push((seen.since, name.clone()));
             }
         }
         due.sort();
         self.queue.extend(due.into_iter().map(|(_, name)| name));
-        let (seen, settle) = (&self.seen, self.rules.settle);
-        let still = |name: &String| {
-            seen.get(name).is_some_and(|seen| {
-                seen.capture.declared_done || now.saturating_sub(seen.since) >= settle
-            })
-        };
-        self.queue.retain(still);
+        let seen = &self.seen;
+        self.queue.retain(|name| {
+            seen.get(name)
+                .is_some_and(|seen| seen.is_settled(now, settle))
+        });
+        self.mark();
     }
 
     fn is_due(&self, name: &str, seen: &Seen) -> bool {
@@ -181,18 +175,23 @@ impl Inbox {
     }
 
     fn requeue(&mut self) {
-        let due = |name: &String| {
-            self.seen
-                .get(name)
-                .is_some_and(|seen| self.is_due(name, seen))
-        };
-        let kept: VecDeque<String> = self
-            .queue
-            .iter()
-            .filter(|name| due(name))
-            .cloned()
-            .collect();
-        self.queue = kept;
+        let mut queue = std::mem::take(&mut self.queue);
+        queue.retain(|name| {
+            let seen = self.seen.get(name);
+            seen.is_some_and(|seen| self.is_due(name, seen))
+        });
+        self.queue = queue;
+        self.mark();
+    }
+
+    /// Notes on each capture whether it is in the queue.
+    fn mark(&mut self) {
+        self.seen.values_mut().for_each(|seen| seen.queued = false);
+        for name in &self.queue {
+            if let Some(seen) = self.seen.get_mut(name) {
+                seen.queued = true;
+            }
+        }
     }
 
     /// The next capture to process, if a worker is free. It counts as running until [`Inbox::ended`].
@@ -201,7 +200,8 @@ impl Inbox {
             return None;
         }
         let name = self.queue.pop_front()?;
-        let seen = self.seen.get(&name)?;
+        let seen = self.seen.get_mut(&name)?;
+        seen.queued = false;
         let (inputs, recipe) = (seen.fingerprint.clone(), self.recipe.clone());
         self.running
             .insert(name.clone(), (inputs.clone(), recipe.clone()));
@@ -235,9 +235,7 @@ impl Inbox {
     /// When something may be due without anything new being seen: the end of the earliest settling.
     pub fn wakes(&self) -> Option<Duration> {
         let settling = self.seen.iter().filter(|(name, seen)| {
-            self.is_due(name, seen)
-                && !self.queue.contains(name)
-                && !self.running.contains_key(*name)
+            !seen.queued && !self.running.contains_key(*name) && self.is_due(name, seen)
         });
         settling
             .map(|(_, seen)| seen.since + self.rules.settle)
@@ -264,7 +262,7 @@ impl Inbox {
         self.seen.iter().map(|(name, seen)| {
             let state = if self.running.contains_key(name) {
                 State::Running
-            } else if self.queue.contains(name) {
+            } else if seen.queued {
                 State::Queued
             } else if self.is_due(name, seen) {
                 State::Settling

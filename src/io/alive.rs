@@ -20,6 +20,7 @@ struct Stages {
 }
 
 /// An entry in the list of unfinished stages; gone when it is dropped.
+#[derive(Debug)]
 pub(super) struct Alive(usize);
 
 impl Alive {

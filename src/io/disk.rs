@@ -14,6 +14,12 @@ use crate::world::{Entry, Identity, Stage, World, failure};
 /// What the name of every hidden folder of ours contains.
 pub(super) const MARK: &str = ".meshloom-";
 
+/// The same while it is made.
+const NEW: &str = ".new.meshloom-";
+
+/// The file in a hidden folder that its owner holds a lock on.
+const LOCK: &str = ".lock";
+
 /// The files of this machine.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Disk;
@@ -136,6 +142,8 @@ struct DiskStage {
     created: Vec<PathBuf>,
     keep: bool,
     alive: Alive,
+    /// Held as long as this process lives.
+    lock: Option<File>,
 }
 
 impl DiskStage {
@@ -152,6 +160,7 @@ impl DiskStage {
             created: Vec::new(),
             keep: false,
             alive: Alive::new(),
+            lock: None,
         };
         stage.create_folders(parent)?;
         let name = out.file_name().unwrap_or_default().to_string_lossy();
@@ -172,8 +181,20 @@ impl DiskStage {
         static COUNT: AtomicUsize = AtomicUsize::new(0);
         let count = COUNT.fetch_add(1, Ordering::Relaxed);
         let process = std::process::id();
+        sweep(folder, name);
+        // Nobody sees the folder under its name before it is locked.
+        let unlocked = folder.join(format!(".{name}{NEW}{process}-{count}"));
         let hidden = folder.join(format!(".{name}{MARK}{process}-{count}"));
-        fs::create_dir(&hidden)?;
+        fs::create_dir(&unlocked)?;
+        self.alive.made(&unlocked);
+        match locked(&unlocked, &hidden) {
+            Ok(lock) => self.lock = Some(lock),
+            Err(error) => {
+                // The first failure is the one to tell.
+                let _ = fs::remove_dir_all(&unlocked);
+                return Err(error);
+            }
+        }
         self.alive.made(&hidden);
         self.hidden = hidden;
         Ok(())
@@ -197,6 +218,31 @@ impl DiskStage {
         let parent = path.parent().unwrap_or(Path::new(""));
         self.create_folders(parent)?;
         fs::rename(self.hidden.join(name), path).map_err(|error| failure(path, "write", &error))
+    }
+}
+
+/// Locks a new folder and gives it its name. Without locks nobody can tell whether it is left over: it is
+/// then let alone.
+fn locked(new: &Path, hidden: &Path) -> io::Result<File> {
+    let lock = File::create(new.join(LOCK))?;
+    let _ = lock.try_lock();
+    fs::rename(new, hidden)?;
+    Ok(lock)
+}
+
+/// Removes the hidden folders beside an output called `name` whose owners were killed: those whose lock
+/// nobody holds. Whatever cannot be locked or removed stays.
+fn sweep(folder: &Path, name: &str) {
+    let ours = format!(".{name}{MARK}");
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        if !entry.file_name().to_string_lossy().starts_with(&ours) {
+            continue;
+        }
+        let stage = entry.path();
+        let lock = OpenOptions::new().write(true).open(stage.join(LOCK));
+        if lock.is_ok_and(|lock| lock.try_lock().is_ok()) {
+            let _ = fs::remove_dir_all(stage);
+        }
     }
 }
 
@@ -296,6 +342,32 @@ mod tests {
         );
         drop(stage);
         assert_eq!(names(folder.path()), [""; 0]);
+    }
+
+    #[test]
+    fn a_stage_whose_owner_was_killed_is_swept_away_and_no_other() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("out");
+        let alive = Disk.stage(&out).unwrap();
+        let left = |name: &str, lock: bool| {
+            let left = folder.path().join(name);
+            fs::create_dir(&left).unwrap();
+            if lock {
+                fs::write(left.join(LOCK), "").unwrap();
+            }
+            left
+        };
+        let dead = left(".out.meshloom-1-0", true);
+        let others = [
+            left(".other.meshloom-1-0", true),
+            left(".out.meshloom-1-1", false),
+            left("out.meshloom-1-0", true),
+        ];
+        let next = Disk.stage(&out).unwrap();
+        assert!(!dead.exists() && others.iter().all(|left| left.exists()));
+        for stage in [alive, next] {
+            stage.write("1", b"one").unwrap();
+        }
     }
 
     #[test]

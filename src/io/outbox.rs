@@ -1,33 +1,43 @@
 //! The folder that a watch writes to: each capture's results arrive by one rename, and a journal says what
 //! was done, so that a run killed at any moment leaves nothing half-written and forgets nothing.
 
-use std::fs::{self, OpenOptions};
-use std::io::{self, Write};
+use std::collections::BTreeMap;
+use std::fs::{self, File, Metadata, OpenOptions, TryLockError};
+use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use crate::diag::Result;
+use super::alive::Alive;
+use crate::diag::{Diagnostic, Result};
 use crate::world::failure;
 
 /// The journal's name in the folder.
 const JOURNAL: &str = ".meshloom-journal.jsonl";
 /// What a folder is called while it is filled, and while it makes way.
-const PART: &str = ".part";
+const PART: &str = ".meshloom-part";
 const OLD: &str = ".old";
 
-/// A folder of results.
-#[derive(Debug, Clone)]
+/// What a watch holds a lock on as long as it runs.
+const LOCK: &str = ".meshloom-lock";
+
+/// A folder of results, of one watch at a time.
+#[derive(Debug)]
 pub struct Outbox {
     folder: PathBuf,
+    /// What goes with the process when it is told to end at once.
+    staged: Mutex<BTreeMap<String, Alive>>,
+    _lock: Option<File>,
 }
 
 impl Outbox {
     /// Opens the folder, makes it if it is missing, and clears up what a killed run has left.
     ///
     /// # Errors
-    /// It cannot be made or read.
+    /// It cannot be made or read; another watch writes to it.
     pub fn open(folder: &Path) -> Result<Outbox> {
         let failed = |error: io::Error| failure(folder, "write", &error);
         fs::create_dir_all(folder).map_err(failed)?;
+        let lock = locked(folder)?;
         for entry in fs::read_dir(folder).map_err(failed)? {
             let path = entry.map_err(failed)?.path();
             let name = path
@@ -41,6 +51,8 @@ impl Outbox {
         }
         Ok(Outbox {
             folder: folder.to_path_buf(),
+            staged: Mutex::default(),
+            _lock: lock,
         })
     }
 
@@ -72,10 +84,12 @@ impl Outbox {
     pub fn append(&self, line: &str) -> Result<()> {
         let path = self.folder.join(JOURNAL);
         let write = || -> io::Result<()> {
-            let torn =
-                fs::read(&path).is_ok_and(|bytes| bytes.last().is_some_and(|byte| *byte != b'\n'));
-            let mut file = OpenOptions::new().create(true).append(true).open(&path)?;
-            let line = if torn {
+            let mut file = OpenOptions::new()
+                .create(true)
+                .read(true)
+                .append(true)
+                .open(&path)?;
+            let line = if torn(&mut file)? {
                 format!("\n{line}\n")
             } else {
                 format!("{line}\n")
@@ -92,12 +106,21 @@ impl Outbox {
     /// It cannot be made.
     pub fn stage(&self, name: &str) -> Result<PathBuf> {
         let part = self.hidden(name, PART);
+        let alive = Alive::new();
+        // before it is made: told to end in between, nobody else would know of it
+        alive.made(&part);
         let make = || -> io::Result<()> {
             remove(&part)?;
             fs::create_dir(&part)
         };
         make().map_err(|error| failure(&part, "write", &error))?;
+        self.staged().insert(name.to_string(), alive);
         Ok(part)
+    }
+
+    fn staged(&self) -> MutexGuard<'_, BTreeMap<String, Alive>> {
+        // Entries come and go whole; a panic elsewhere cannot tear them.
+        self.staged.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Writes a file into the staged folder of `name`.
@@ -116,6 +139,8 @@ impl Outbox {
     pub fn publish(&self, name: &str) -> Result<()> {
         let (place, old) = (self.folder.join(name), self.hidden(name, OLD));
         let swap = || -> io::Result<()> {
+            // First of all: killed after the move, nobody would know that it is out of date.
+            remove(&self.error_file(name))?;
             remove(&old)?;
             if place.exists() {
                 fs::rename(&place, &old)?;
@@ -124,15 +149,17 @@ impl Outbox {
                 let _ = fs::rename(&old, &place);
                 return Err(error);
             }
-            remove(&old)?;
-            remove(&self.error_file(name))
+            remove(&old)
         };
-        swap().map_err(|error| failure(&place, "write", &error))
+        swap().map_err(|error| failure(&place, "write", &error))?;
+        self.staged().remove(name);
+        Ok(())
     }
 
     /// Drops the staged folder of `name`.
     pub fn discard(&self, name: &str) {
         let _ = remove(&self.hidden(name, PART));
+        self.staged().remove(name);
     }
 
     /// Says beside the results of `name` why its last run failed; they stay.
@@ -170,6 +197,33 @@ impl Outbox {
     }
 }
 
+/// The lock that says that a watch writes here; none where the file system has no locks. It goes with its
+/// process, however that ends.
+fn locked(folder: &Path) -> Result<Option<File>> {
+    let Ok(file) = File::create(folder.join(LOCK)) else {
+        return Ok(None);
+    };
+    match file.try_lock() {
+        Ok(()) => Ok(Some(file)),
+        Err(TryLockError::WouldBlock) => Diagnostic::error("another watch writes to this folder")
+            .in_file(folder)
+            .hint("end it first, or give this one another `-o`")
+            .err(),
+        Err(TryLockError::Error(_)) => Ok(None),
+    }
+}
+
+/// Whether the last line of a journal was never finished.
+fn torn(file: &mut File) -> io::Result<bool> {
+    if file.metadata()?.len() == 0 {
+        return Ok(false);
+    }
+    let mut last = [0];
+    file.seek(SeekFrom::End(-1))?;
+    file.read_exact(&mut last)?;
+    Ok(last != *b"\n")
+}
+
 /// Undoes what a run killed in the middle has left of `hidden`.
 fn recover(folder: &Path, path: &Path, hidden: &str) -> io::Result<()> {
     if let Some(name) = hidden.strip_suffix(OLD) {
@@ -199,7 +253,8 @@ fn remove(path: &Path) -> io::Result<()> {
 }
 
 /// Every file below `folder` down to one subfolder, with length and time: what an inbox looks at. The
-/// folder `except` and everything in it is left out.
+/// folder `except` and everything in it is left out. One look at each file: a hundred thousand take a
+/// fraction of a second.
 ///
 /// # Errors
 /// The folder itself cannot be read; a subfolder that cannot is passed over.
@@ -211,33 +266,42 @@ pub fn listing(
     let mut found = Vec::new();
     let entries = fs::read_dir(folder).map_err(|error| failure(folder, "list", &error))?;
     for entry in entries.flatten() {
+        let Some(found_here) = metadata(&entry) else {
+            continue;
+        };
+        let name = PathBuf::from(entry.file_name());
+        if !found_here.is_dir() {
+            found.extend(file(name, &found_here));
+            continue;
+        }
         let path = entry.path();
         if except.is_some() && fs::canonicalize(&path).ok() == except {
             continue;
         }
-        match fs::metadata(&path) {
-            Ok(metadata) if metadata.is_dir() => {
-                let inner = fs::read_dir(&path).into_iter().flatten().flatten();
-                found.extend(inner.filter_map(|entry| file(folder, &entry.path())));
-            }
-            Ok(_) => found.extend(file(folder, &path)),
-            Err(_) => {}
-        }
+        let inner = fs::read_dir(&path).into_iter().flatten().flatten();
+        let inside = |entry: fs::DirEntry| file(name.join(entry.file_name()), &metadata(&entry)?);
+        found.extend(inner.filter_map(inside));
     }
     Ok(found)
 }
 
-fn file(folder: &Path, path: &Path) -> Option<(PathBuf, u64, Option<std::time::Duration>)> {
-    let metadata = fs::metadata(path).ok().filter(fs::Metadata::is_file)?;
+/// What an entry is, links followed.
+fn metadata(entry: &fs::DirEntry) -> Option<Metadata> {
+    let own = entry.metadata().ok()?;
+    match own.is_symlink() {
+        true => fs::metadata(entry.path()).ok(),
+        false => Some(own),
+    }
+}
+
+fn file(path: PathBuf, metadata: &Metadata) -> Option<(PathBuf, u64, Option<std::time::Duration>)> {
     let modified = metadata
         .modified()
         .ok()
         .and_then(|time| time.duration_since(std::time::UNIX_EPOCH).ok());
-    Some((
-        path.strip_prefix(folder).ok()?.to_path_buf(),
-        metadata.len(),
-        modified,
-    ))
+    metadata
+        .is_file()
+        .then_some((path, metadata.len(), modified))
 }
 
 #[cfg(test)]
@@ -266,14 +330,26 @@ mod tests {
     }
 
     #[test]
+    fn two_watches_do_not_share_a_folder() {
+        let (_folder, outbox) = outbox();
+        let error = Outbox::open(outbox.folder()).unwrap_err();
+        assert!(error.message.contains("another watch"), "{error}");
+        let folder = outbox.folder().to_path_buf();
+        drop(outbox);
+        assert!(Outbox::open(&folder).is_ok());
+    }
+
+    #[test]
     fn a_run_killed_between_the_renames_is_undone() {
         let (_folder, outbox) = outbox();
         publish(&outbox, "1");
         outbox.stage("a").unwrap();
         fs::rename(outbox.folder().join("a"), outbox.folder().join(".a.old")).unwrap();
-        let again = Outbox::open(outbox.folder()).unwrap();
+        let place = outbox.folder().to_path_buf();
+        drop(outbox);
+        let again = Outbox::open(&place).unwrap();
         assert_eq!(again.published("a", "f").as_deref(), Some("1"));
-        assert!(!outbox.folder().join(".a.part").exists());
+        assert!(!place.join(".a.meshloom-part").exists());
     }
 
     #[test]

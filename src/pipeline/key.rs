@@ -9,8 +9,13 @@ pub struct Key([u8; 32]);
 impl Key {
     /// Begins the key of a result of `operation`.
     pub fn of(operation: &str) -> KeyBuilder {
+        Key::by(env!("CARGO_PKG_VERSION"), operation)
+    }
+
+    /// The same by another version of this program.
+    fn by(version: &str, operation: &str) -> KeyBuilder {
         KeyBuilder(blake3::Hasher::new())
-            .text(env!("CARGO_PKG_VERSION"))
+            .text(version)
             .text(operation)
     }
 }
@@ -94,6 +99,13 @@ mod tests {
             Key::of("x").number(1.0).finish(),
             Key::of("x").number(1.0).finish()
         );
+    }
+
+    #[test]
+    fn another_version_remembers_nothing_of_this_one() {
+        let own = env!("CARGO_PKG_VERSION");
+        assert_eq!(Key::by(own, "fit").finish(), Key::of("fit").finish());
+        assert_ne!(Key::by("0.0.0", "fit").finish(), Key::of("fit").finish());
     }
 
     #[test]

@@ -5,6 +5,7 @@ mod deliver;
 mod describe;
 mod find;
 mod frames;
+mod held;
 mod input;
 mod key;
 mod key_path;

@@ -1,8 +1,6 @@
 //! What a workbench does with sets of shapes: maps of poses, poses added, motions transferred by examples.
 
-use std::sync::Arc;
-
-use super::key::{Key, KeyBuilder};
+use super::key::KeyBuilder;
 use super::memory::Remembered;
 use super::value::{Frames, Keyed, LoomValue, ShapeValue};
 use super::workbench::{Found, Workbench};
@@ -12,7 +10,7 @@ use crate::edit;
 use crate::edit::transfer::{Examples, transfer};
 use crate::loom::Loom;
 use crate::loom::pose_map::pose_map;
-use crate::mesh::{FrameSource, Sequence};
+use crate::mesh::FrameSource;
 
 /// What a comparison of spaces found, as JSON.
 struct Spaces(String);
@@ -32,37 +30,6 @@ impl Remembered for Spaces {
 }
 
 impl Workbench {
-    /// Shapes of one mesh as a sequence.
-    ///
-    /// # Errors
-    /// No shapes; one has other faces than the first.
-    pub fn sequence_of(&self, shapes: &[ShapeValue]) -> Result<Frames> {
-        let Some(first) = shapes.first() else {
-            return Diagnostic::error("an array of meshes has none").err();
-        };
-        let topology = &first.value.topology;
-        for (index, shape) in shapes.iter().enumerate() {
-            if !shape.value.topology.same_connectivity(topology) {
-                let (found, wanted) = (shape.vertices(), first.vertices());
-                let message = format!(
-                    "mesh {} has other faces than the first ({found} and {wanted} vertices)",
-                    index + 1
-                );
-                return Diagnostic::error(message).err();
-            }
-        }
-        let positions: Vec<f32> = shapes
-            .iter()
-            .flat_map(|shape| shape.value.positions.iter().copied())
-            .collect();
-        self.charge(4 * positions.len())?;
-        let key = shapes
-            .iter()
-            .fold(Key::of("shapes"), |key, shape| key.key(shape.key));
-        let sequence = Sequence::new(Arc::clone(topology), positions, None);
-        Ok(Keyed::new(sequence, key.finish()))
-    }
-
     /// A loom from scratch: each pose at its place of the map, in `space`.
     ///
     /// # Errors
@@ -81,6 +48,7 @@ impl Workbench {
         let (loom, made) = self.memory().remember(key, || {
             pose_map(&poses.value, places, space, fps, self.task())
         })?;
+        self.hold_loom(&loom)?;
         self.note("pose_map", format!("{} poses", poses.frames()), made);
         Ok(LoomValue::bare(Keyed { value: loom, key }))
     }
@@ -106,6 +74,7 @@ impl Workbench {
                 .err();
         }
         let added = edit::add_pose(of, &shape.value.positions, at)?;
+        self.hold_loom(&added)?;
         let key = loom.loom.then("add_pose").key(shape.key);
         let key = with_places(key, at.as_slice()).finish();
         Ok(LoomValue::bare(Keyed::new(added, key)))

@@ -8,6 +8,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use serde::Serialize;
 
 use super::frames::in_memory;
+use super::held::Held;
 use super::key::Key;
 use super::memory::{Made, Memory, Remembered};
 use super::request::FitRequest;
@@ -30,7 +31,7 @@ use crate::sample::{Sampled, Times};
 use crate::task::Task;
 use crate::world::World;
 
-/// Results that a recipe makes natively may hold this many bytes together.
+/// Results that a recipe has made natively may hold this many bytes at one time.
 const NATIVE_BYTES: usize = 8 << 30;
 
 /// Units of a recipe's figure, across and down.
@@ -63,9 +64,9 @@ pub struct Workbench {
 struct Log {
     steps: Vec<Step>,
     reads: BTreeSet<PathBuf>,
-    bytes: usize,
     /// Frames that were sampled, by their key, and the loom they came from.
     sampled: Vec<(Key, LoomValue)>,
+    held: Held,
 }
 
 /// Frames that took work: what files held when they had the identities that are part of its key, a
@@ -217,6 +218,7 @@ impl Workbench {
             let loom = fit(&frames.value, &options, &self.task)?.unpack(&mut warnings);
             Ok(Found { loom, warnings })
         })?;
+        self.hold_loom(&fitted.loom)?;
         self.note("fit", format!("{} frames", frames.value.frames()), made);
         let source = Source {
             frames: frames.clone(),
@@ -296,10 +298,12 @@ impl Workbench {
         let value = &loom.loom.value;
         let sampling = times.over(value.frames(), value.fps())?;
         let sampled = Sampled::new((**value).clone(), sampling);
-        self.charge(12 * sampled.topology().vertices() * sampled.frames())?;
-        let (frames, made) = self
-            .memory
-            .remember(key, || in_memory(&sampled, &self.task))?;
+        let bytes = 12 * sampled.topology().vertices() * sampled.frames();
+        let (frames, made) = self.memory.remember(key, || {
+            self.has_room(bytes)?;
+            in_memory(&sampled, &self.task)
+        })?;
+        self.log().held.add(&frames, bytes);
         self.note("sample", format!("{} frames", frames.frames()), made);
         self.log().sampled.push((key, loom.clone()));
         Ok(Keyed { value: frames, key })
@@ -351,14 +355,29 @@ impl Workbench {
     }
 
     pub(super) fn shape(&self, loom: &Loom, positions: Vec<f32>, key: Key) -> Result<ShapeValue> {
-        self.charge(4 * positions.len())?;
-        Ok(Keyed::new(
+        let topology = Arc::clone(loom.topology());
+        self.held_shape(
             Shape {
-                topology: Arc::clone(loom.topology()),
+                topology,
                 positions,
             },
             key,
-        ))
+        )
+    }
+
+    fn held_shape(&self, shape: Shape, key: Key) -> Result<ShapeValue> {
+        let bytes = 4 * shape.positions.len();
+        self.has_room(bytes)?;
+        let shape = Keyed::new(shape, key);
+        self.log().held.add(&shape.value, bytes);
+        Ok(shape)
+    }
+
+    /// Counts what a loom holds; an error where that is too much.
+    pub(super) fn hold_loom(&self, loom: &Loom) -> Result<()> {
+        // The vectors of h are nearly all of a loom, and what edited looms share.
+        self.log().held.add(loom.shape(), loom.size());
+        self.has_room(0)
     }
 
     /// Frames `first` to `last` of a capture, from 1, both included.
@@ -389,8 +408,7 @@ impl Workbench {
             topology: Arc::clone(one.value.topology()),
             positions: one.value.frame(0).to_vec(),
         };
-        self.charge(4 * shape.positions.len())?;
-        Ok(Keyed::new(shape, one.key))
+        self.held_shape(shape, one.key)
     }
 
     /// Shapes of one mesh as a capture of so many frames.
@@ -410,12 +428,10 @@ impl Workbench {
             positions.extend_from_slice(&shape.value.positions);
             key = key.key(shape.key);
         }
-        self.charge(4 * positions.len())?;
         let topology = Arc::clone(&first.value.topology);
-        Ok(Keyed::new(
-            Sequence::new(topology, positions, None),
-            key.finish(),
-        ))
+        let gathered = Keyed::new(Sequence::new(topology, positions, None), key.finish());
+        self.hold_frames(&gathered)?;
+        Ok(gathered)
     }
 
     /// Key poses completed to a motion, at the times asked for.
@@ -425,7 +441,7 @@ impl Workbench {
     pub fn complete(&self, keys: &Frames, request: &CompleteRequest) -> Result<Warned<Frames>> {
         let key = request.key(keys);
         let frames = request.times_of(&keys.value)?.len();
-        self.charge(12 * keys.vertices() * frames)?;
+        self.has_room(12 * keys.vertices() * frames)?;
         let (completed, made) = self.memory.remember(key, || {
             let mut warnings = Vec::new();
             let frames = complete(&keys.value, request, &self.task)?.unpack(&mut warnings);
@@ -437,8 +453,10 @@ impl Workbench {
             })
         })?;
         self.note("complete", format!("{} keys", keys.frames()), made);
+        let output = Keyed::new(completed.sequence.clone(), key);
+        self.hold_frames(&output)?;
         Ok(Warned {
-            output: Keyed::new(completed.sequence.clone(), key),
+            output,
             warnings: completed.warnings.clone(),
         })
     }
@@ -449,7 +467,7 @@ impl Workbench {
     /// As [`morph`].
     pub fn morph(&self, poses: &Frames, request: &MorphRequest) -> Result<Warned<Frames>> {
         let frames = morph_frames(&poses.value, request)?;
-        self.charge(12 * poses.vertices() * frames)?;
+        self.has_room(12 * poses.vertices() * frames)?;
         let key = poses.then("morph").text(&format!("{request:?}")).finish();
         let (found, made) = self.memory.remember(key, || {
             let mut warnings = Vec::new();
@@ -461,8 +479,10 @@ impl Workbench {
             })
         })?;
         self.note("morph", format!("{} poses", poses.frames()), made);
+        let output = Keyed::new(found.sequence.clone(), key);
+        self.hold_frames(&output)?;
         Ok(Warned {
-            output: Keyed::new(found.sequence.clone(), key),
+            output,
             warnings: found.warnings.clone(),
         })
     }
@@ -523,9 +543,8 @@ impl Workbench {
     }
 
     fn keyed_shape(&self, shape: Warned<Shape>, key: Key) -> Result<Warned<ShapeValue>> {
-        self.charge(4 * shape.output.positions.len())?;
         Ok(Warned {
-            output: Keyed::new(shape.output, key),
+            output: self.held_shape(shape.output, key)?,
             warnings: shape.warnings,
         })
     }
@@ -638,11 +657,9 @@ impl Workbench {
         });
     }
 
-    /// Counts what native results hold; scripts' own values have limits of their own.
-    pub(super) fn charge(&self, bytes: usize) -> Result<()> {
-        let mut log = self.log();
-        log.bytes = log.bytes.saturating_add(bytes);
-        if log.bytes <= NATIVE_BYTES {
+    /// Whether so many bytes more may be held; scripts' own values have limits of their own.
+    pub(super) fn has_room(&self, bytes: usize) -> Result<()> {
+        if self.log().held.has_room(bytes, NATIVE_BYTES) {
             return Ok(());
         }
         Diagnostic::error(format!(
@@ -651,6 +668,12 @@ impl Workbench {
         ))
         .hint("sample fewer frames, or save looms instead of frames")
         .err()
+    }
+
+    /// Counts frames; an error where they are too many.
+    pub(super) fn hold_frames(&self, frames: &Frames) -> Result<()> {
+        self.log().held.add(&frames.value, frames.value.size());
+        self.has_room(0)
     }
 }
 

@@ -85,6 +85,20 @@ pub fn calls(text: &str) -> Vec<Call> {
     found
 }
 
+/// The modules that a recipe imports by a plain text, as they are written.
+pub fn imports(text: &str) -> Vec<String> {
+    let tokens = tokens(text);
+    let pairs = tokens.windows(2);
+    let named = pairs.filter_map(|pair| match pair {
+        [(Token::Word, word), (Token::Literal, name)] if &text[word.clone()] == "import" => {
+            let name = text[name.clone()].strip_prefix('"')?;
+            name.strip_suffix('"').map(str::to_string)
+        }
+        _ => None,
+    });
+    named.collect()
+}
+
 /// The names of the functions that the recipe itself defines.
 pub fn definitions(text: &str) -> Vec<String> {
     let tokens = tokens(text);
@@ -482,5 +496,12 @@ mod tests {
     fn positions_count_characters() {
         assert_eq!(position("aß\nc", 4), (2, 1));
         assert_eq!(position("aßc", 3), (1, 3));
+    }
+
+    #[test]
+    fn imports_are_found_where_they_are_code() {
+        let text =
+            "// import \"no\"\nimport \"lib/a\" as a;\nlet b = \"import\"; import \"b\" as b;";
+        assert_eq!(imports(text), ["lib/a", "b"]);
     }
 }

@@ -169,6 +169,25 @@ impl Lines {
         self.child.try_wait().expect("the child is ours").is_some()
     }
 
+    /// The most memory that the run has held so far, in bytes; 0 where the system does not say.
+    pub fn peak_memory(&self) -> usize {
+        let status = format!("/proc/{}/status", self.child.id());
+        let text = std::fs::read_to_string(status).unwrap_or_default();
+        let peak = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+        let kilobytes = peak.map(|peak| peak.trim().trim_end_matches(" kB").parse());
+        kilobytes
+            .and_then(Result::ok)
+            .map_or(0, |peak: usize| 1024 * peak)
+    }
+
+    /// Asks the run to end and waits until it has.
+    pub fn terminate(mut self) {
+        let id = self.child.id().to_string();
+        let asked = Command::new("kill").args(["-TERM", &id]).status();
+        assert!(asked.is_ok_and(|status| status.success()));
+        let _ = self.child.wait();
+    }
+
     /// Ends the run without a warning, as a power cut would.
     pub fn kill(mut self) {
         let _ = self.child.kill();

@@ -51,7 +51,7 @@ pub(super) fn register(engine: &mut Engine) {
 pub(super) fn frames_of(context: &Context, value: Dynamic) -> Result<Frames> {
     if value.is_array() {
         let meshes = value.into_array().unwrap_or_default();
-        return context.bench().sequence_of(&shapes(meshes)?);
+        return context.bench().gather(&shapes(meshes)?);
     }
     match self::value(value)? {
         Value::Sequence(frames) => Ok(frames),

@@ -68,7 +68,7 @@ mod functions {
         let options = Options::new(options, &["space", "fps"])?;
         let (meshes, places) = placed(poses)?;
         let context = Context::of(&call)?;
-        let poses = pass(context.bench().sequence_of(&meshes))?;
+        let poses = pass(context.bench().gather(&meshes))?;
         let space = options.word("space")?.unwrap_or_else(|| "vertices".into());
         let fps = options.number("fps")?;
         pass(context.bench().pose_map(&poses, &places, &space, fps))

@@ -69,9 +69,10 @@ mod functions {
     ///
     /// `loom.add_loop(a, b)`, `loom.add_loop(a, b, #{ times, bridge })`
     ///
-    /// a and b are times in frames; they are rounded to the nearest knots. n grows by the frames inside
-    /// and the bridges, all other frames keep their bits. Where the ends lie more than a mean step apart,
-    /// `bridge` frames go between (default: the distance over the local speed; 0: none).
+    /// a and b are times in frames; b is moved so that the loop takes whole frames, and knots are put at
+    /// both. n grows by the frames inside and the bridges; frames more than two spans from a seam keep
+    /// their bits. Where the ends lie apart, `bridge` frames go between two passes (default: the distance
+    /// over the local speed, and more until the seam does not show; 0: none).
     ///
     /// ```rhai
     /// let walk = fit(demo("gallop"), #{ tolerance: 0.05 });
