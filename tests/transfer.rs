@@ -1,8 +1,12 @@
 //! Deformation transfer: what it reproduces, what it keeps, what it refuses.
 
+mod support;
+
 use std::sync::Arc;
 
+use meshloom::edit::Edit;
 use meshloom::edit::transfer::{Examples, transfer};
+use meshloom::format;
 use meshloom::loom::Loom;
 use meshloom::loom::fit::{FitOptions, fit};
 use meshloom::mesh::{FrameSource, Sequence, Topology};
@@ -141,6 +145,20 @@ fn a_loom_about_another_pose_reproduces_the_examples_too() {
     }
 }
 
+/// Eight frames between the poses, fitted loosely.
+fn motion(topology: &Arc<Topology>, points: &[f64], space: &str) -> Loom {
+    let frames: Vec<Vec<f64>> = (0..8)
+        .map(|i| posed(points, 0.2 * f64::from(i), 0.05 * f64::from(i * i)))
+        .collect();
+    let options = FitOptions {
+        space: space.to_string(),
+        left_out: false,
+        ..FitOptions::default()
+    };
+    let capture = sequence(topology, &frames);
+    fit(&capture, &options, &Task::default()).unwrap().output
+}
+
 #[test]
 fn time_stays_and_an_edit_before_or_after_is_the_same() {
     let (topology, points) = tube(12, 8, 0.4);
@@ -150,18 +168,68 @@ fn time_stays_and_an_edit_before_or_after_is_the_same() {
         example_poses(&target, &others),
     )
     .unwrap();
-    let frames: Vec<Vec<f64>> = (0..8)
-        .map(|i| posed(&points, 0.2 * f64::from(i), 0.05 * f64::from(i * i)))
-        .collect();
-    let loom = exact(&sequence(&topology, &frames), "vertices");
-    let found = transfer(&loom, &examples, &Task::default())
-        .unwrap()
-        .output
-        .loom;
-    assert_eq!(found.time(), loom.time());
-    assert_eq!(found.pose().sites(), loom.pose().sites());
-    assert_eq!(found.topology().vertices(), target.vertices());
-    assert_eq!(found.fps(), Some(24.0));
+    let on_target = |loom: &Loom| {
+        let found = transfer(loom, &examples, &Task::default()).unwrap();
+        found.output.loom
+    };
+    let edits = [
+        Edit::Hold {
+            time: 4.0,
+            frames: 3,
+        },
+        Edit::Speed {
+            from: 2.0,
+            to: 5.0,
+            factor: 0.5,
+        },
+        Edit::MoveControl {
+            control: 3,
+            to: [0.1, 0.2],
+        },
+        Edit::Reverse,
+    ];
+    for space in SPACES {
+        let loom = motion(&topology, &points, space.name);
+        let found = on_target(&loom);
+        assert_eq!(found.time(), loom.time());
+        assert_eq!(found.pose().sites(), loom.pose().sites());
+        assert_eq!(found.topology().vertices(), target.vertices());
+        assert_eq!(found.fps(), Some(24.0));
+        for edit in &edits {
+            let edited = |loom: &Loom| edit.apply(loom).unwrap().output;
+            let (before, after) = (on_target(&edited(&loom)), edited(&found));
+            assert_eq!(before.frames(), after.frames(), "{edit:?}");
+            for frame in 1..=before.frames() {
+                let t = frame as f64;
+                let error = farthest(&before.at(t).unwrap(), &after.at(t).unwrap());
+                assert!(
+                    error < ROUNDING,
+                    "{}, {edit:?}, frame {frame}: {error}",
+                    space.name
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_loaded_loom_is_transferred_like_the_fitted_one() {
+    let (topology, points) = tube(12, 8, 0.4);
+    let (target, others) = tube(9, 10, 0.7);
+    let examples = Examples::new(
+        example_poses(&topology, &points),
+        example_poses(&target, &others),
+    )
+    .unwrap();
+    for space in SPACES {
+        let loom = motion(&topology, &points, space.name);
+        let loaded = format::loom::read(&format::loom::write(&loom).unwrap()).unwrap();
+        let [ours, theirs] = [&loom, &loaded].map(|loom| {
+            let found = transfer(loom, &examples, &Task::default()).unwrap();
+            (found.output.loom.at(4.5).unwrap(), found.output.coverage)
+        });
+        assert_eq!(ours, theirs, "{}", space.name);
+    }
 }
 
 #[test]
@@ -216,4 +284,69 @@ fn copies_and_frames_out_of_reach_are_reported() {
         "{said:?}"
     );
     assert!(found.output.coverage[5] > 0.9 && found.output.coverage[0] < 1e-6);
+}
+
+/// A folder with two sheets of different size that move alike, and a loom of the first.
+fn folder_of_sheets() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, side) in [("small", 5), ("large", 7)] {
+        let sheet = support::capture::sheet(side, 12);
+        sheet.write_objs(&folder.path().join(name));
+    }
+    support::meshloom(
+        folder.path(),
+        "fit small -o small.loom --space gradients --tolerance 0.001 --fps 24",
+    )
+    .done();
+    folder
+}
+
+#[test]
+fn the_command_writes_frames_or_a_loom_and_reports_the_coverage_of_each_frame() {
+    let folder = folder_of_sheets();
+    let run = |args: &str| support::meshloom(folder.path(), args);
+    let command = "transfer small.loom --examples small large --json -o";
+    let object = run(&format!("{command} moved/f_##.obj")).done().object();
+    assert_eq!(object["frames"], 12);
+    let coverage = object["report"]["coverage"].as_array().unwrap();
+    assert_eq!(coverage.len(), 12);
+    assert!(coverage.iter().all(|x| x.as_f64().unwrap() < 0.05));
+    // every frame is an example: the large sheet's own motion comes back but for what the fit lost
+    let found = run("compare large moved --json").done().object();
+    assert!(found["kg_percent"].as_f64().unwrap() < 1.0, "{found}");
+    run(&format!("{command} moved.loom")).done();
+    run("sample moved.loom -o again/f_##.obj").done();
+    let read = |name: &str| std::fs::read(folder.path().join(name)).unwrap();
+    assert_eq!(read("moved/f_07.obj"), read("again/f_07.obj"));
+}
+
+#[test]
+fn the_command_says_what_is_wrong_with_examples() {
+    let folder = folder_of_sheets();
+    let run = |args: &str| support::meshloom(folder.path(), args);
+    run("transfer small.loom --examples large small -o out")
+        .fails_with_any(&["other faces", "hint"]);
+    run("transfer small.loom --examples small nowhere -o out").fails_with_any(&["nowhere"]);
+    assert!(!folder.path().join("out").exists());
+}
+
+#[test]
+fn info_tells_which_space_suits_a_capture_and_why() {
+    let folder = folder_of_sheets();
+    let run = |args: &str| support::meshloom(folder.path(), args);
+    let object = run("info small --spaces --json").done().object();
+    let found = object["spaces"].as_array().unwrap();
+    assert_eq!(found.len(), SPACES.len());
+    for space in found {
+        for error in ["psi", "linear", "cubic"] {
+            assert!(space["left_out"][error].as_f64().unwrap() >= 0.0);
+        }
+        assert!(space["seconds"].as_f64().is_some() && space["numbers"].as_u64().is_some());
+    }
+    let best = object["best_space"].as_str().unwrap();
+    assert!(!object["why"].as_str().unwrap().is_empty());
+    let text = run("info small --spaces").done();
+    let said = format!("{}{}", text.stdout, text.stderr);
+    assert!(said.contains(&format!("{best} suits it best")), "{said}");
+    run("info small --range 1:3 --spaces").fails_with_any(&["too few"]);
 }

@@ -91,6 +91,12 @@ impl Pattern {
         self.rows.len()
     }
 
+    /// The rows of the entries of a column, ascending from the diagonal on; the columns' values follow one
+    /// another.
+    pub fn rows(&self, column: usize) -> &[u32] {
+        &self.rows[self.starts[column] as usize..self.starts[column + 1] as usize]
+    }
+
     /// Which of the values is the entry of this row and column, in either order; none when the pattern
     /// has no such entry.
     pub fn entry(&self, row: usize, column: usize) -> Option<usize> {

@@ -90,8 +90,8 @@ impl ReferenceTriangle {
 
     /// Where D takes b1 and b2, for a shape's sides from corner 0 to corners 1 and 2.
     pub fn images(&self, e1: &Vector3<f64>, e2: &Vector3<f64>) -> [Vector3<f64>; 2] {
-        let f1 = e1 / self.length;
-        [f1, (e2 - f1 * self.offset) / self.height]
+        let f1 = e1 * (1.0 / self.length);
+        [f1, (e2 - f1 * self.offset) * (1.0 / self.height)]
     }
 
     /// The sides from corner 0 to corners 1 and 2 of the triangle whose gradient takes b1 and b2 to
@@ -106,7 +106,7 @@ impl ReferenceTriangle {
         let cross = e1.cross(e2);
         let size = cross.norm();
         let flat = size <= COLLINEAR * (e1.norm_squared() + e2.norm_squared());
-        (!flat && size.is_finite()).then(|| self.polar_with(e1, e2, &(cross / size)))
+        (!flat && size.is_finite()).then(|| self.polar_with(e1, e2, &(cross * (1.0 / size))))
     }
 
     /// The polar factors for a triangle of any kind. One without a normal takes, among the vectors
@@ -140,7 +140,8 @@ impl ReferenceTriangle {
     /// decomposition of a plane map with determinant >= 0.
     fn polar_with(&self, e1: &Vector3<f64>, e2: &Vector3<f64>, n: &Vector3<f64>) -> Polar {
         let [f1, f2] = self.images(e1, e2);
-        let r1 = (f1 - n.cross(&f2)).normalize();
+        let r1 = f1 - n.cross(&f2);
+        let r1 = r1 * (1.0 / r1.norm());
         let r2 = n.cross(&r1);
         let pose = Matrix3::from_columns(&[r1, r2, *n]);
         let rest = Matrix3::from_columns(&[self.along, self.across(), self.normal]);

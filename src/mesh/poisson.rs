@@ -33,11 +33,18 @@ impl PoissonAnalysis {
         let sides = triangles
             .iter()
             .flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+        let (symbolic, (corners, components)) = rayon::join(
+            || Analysis::new(Pattern::new(vertices, sides)),
+            || {
+                let corners = VertexCorners::new(vertices, triangles);
+                (corners, Components::new(vertices, triangles))
+            },
+        );
         Ok(Arc::new(PoissonAnalysis {
             triangles: triangles.to_vec(),
-            corners: VertexCorners::new(vertices, triangles),
-            components: Components::new(vertices, triangles),
-            symbolic: Analysis::new(Pattern::new(vertices, sides))?,
+            corners,
+            components,
+            symbolic: symbolic?,
         }))
     }
 
@@ -49,6 +56,11 @@ impl PoissonAnalysis {
     /// The pattern of the vertices that share a triangle, analysed.
     pub fn symbolic(&self) -> &Arc<Analysis> {
         &self.symbolic
+    }
+
+    /// V, the number of vertices.
+    pub fn vertices(&self) -> usize {
+        self.symbolic.pattern().unknowns()
     }
 
     /// The triangles.
@@ -198,37 +210,54 @@ fn point(positions: &[f64], vertex: usize) -> Vector3<f64> {
 
 /// The entries of the Laplacian: sum over triangles of a (grad phi_i . grad phi_j); the first vertex of
 /// each part is held by a spring of stiffness 1 (the entries have no unit), which no solution stretches.
+/// Columns are summed side by side, each over the corners at its vertex.
 fn laplacian(analysis: &PoissonAnalysis, reference: &[ReferenceTriangle]) -> Vec<f64> {
     let pattern = analysis.symbolic.pattern();
     let mut entries = vec![0.0; pattern.entries()];
-    let mut add = |i: u32, j: u32, value: f64| {
-        if let Some(at) = pattern.entry(i as usize, j as usize) {
-            // both orders of an off-diagonal pair are one entry; a vertex named twice meets itself twice
-            entries[at] += if i == j { 2.0 * value } else { value };
-        }
-    };
-    for (&[a, b, c], rest) in analysis.triangles.iter().zip(reference) {
-        let (ab, bc, ca) = half_cotangents(rest);
-        for (i, j, weight) in [(a, b, ab), (b, c, bc), (c, a, ca)] {
-            add(i, j, -weight);
-            add(i, i, 0.5 * weight);
-            add(j, j, 0.5 * weight);
-        }
+    let mut rest = &mut entries[..];
+    let mut chunks = Vec::new();
+    for first in (0..pattern.unknowns()).step_by(CHUNK) {
+        let last = (first + CHUNK).min(pattern.unknowns());
+        let length = (first..last).map(|column| pattern.rows(column).len()).sum();
+        let (chunk, after) = rest.split_at_mut(length);
+        chunks.push((first..last, chunk));
+        rest = after;
     }
+    chunks.into_par_iter().for_each(|(columns, mut entries)| {
+        for vertex in columns {
+            let rows = pattern.rows(vertex);
+            let (column, after) = entries.split_at_mut(rows.len());
+            for &corner in analysis.corners.at(vertex) {
+                let (face, from) = (corner as usize / 3, corner as usize % 3);
+                let weights = half_cotangents(&reference[face]);
+                for to in [(from + 1) % 3, (from + 2) % 3] {
+                    // sides 01, 12, 20: the one between two corners
+                    let weight = weights[if (from + 1) % 3 == to { from } else { to }];
+                    column[0] += weight;
+                    // pairs stand below the diagonal; a vertex named twice meets itself
+                    if let Ok(at) = rows.binary_search(&analysis.triangles[face][to]) {
+                        column[at] -= weight;
+                    }
+                }
+            }
+            entries = after;
+        }
+    });
     for &vertex in analysis.components.first() {
-        add(vertex, vertex, 0.5);
+        let diagonal = pattern.entry(vertex as usize, vertex as usize);
+        diagonal.into_iter().for_each(|at| entries[at] += 1.0);
     }
     entries
 }
 
 /// Half the cotangents of the angles opposite the sides 01, 12, 20.
-fn half_cotangents(rest: &ReferenceTriangle) -> (f64, f64, f64) {
+fn half_cotangents(rest: &ReferenceTriangle) -> [f64; 3] {
     let (l, x, h) = (rest.length, rest.offset, rest.height);
-    (
+    [
         0.5 * (h / l - x * (l - x) / (l * h)),
         0.5 * x / h,
         0.5 * (l - x) / h,
-    )
+    ]
 }
 
 /// a D grad phi_1 and a D grad phi_2, for D b1 and D b2.

@@ -14,7 +14,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use super::orientation::polar_factors;
@@ -25,8 +25,8 @@ use super::{Block, Invariance, ShapeSpace};
 use crate::math::rotation::{exp, log};
 use crate::mesh::{Poisson, Polar, ReferenceTriangle};
 
-/// Triangles that one thread takes at a time; sums are taken chunk by chunk in this order.
-const CHUNK: usize = 2048;
+/// Triangles that one thread takes at a time: small meshes are shared evenly too.
+const CHUNK: usize = 512;
 
 /// The space of deformation gradients.
 pub struct Gradients {
@@ -105,25 +105,14 @@ impl ShapeSpace for Gradients {
         let reference = self.poisson.reference();
         let mean = polar_factors(reference, triangles, positions, &mut polars);
         let [rotations, stretches, placement] = self.split(coordinates);
-        encode_stretches(
-            &self.poisson,
-            &self.shares,
-            self.stretch,
-            &polars,
-            stretches,
-        );
         let back = mean.inverse();
-        rotations
-            .par_chunks_mut(3 * CHUNK)
-            .zip(polars.par_chunks(CHUNK))
-            .zip(self.shares.par_chunks(CHUNK))
-            .for_each(|((rotations, polars), shares)| {
-                let faces = rotations.chunks_exact_mut(3).zip(polars).zip(shares);
-                for ((out, polar), share) in faces {
-                    let w = log(&(back * polar.rotation)) * (self.rotation * share);
-                    out.copy_from_slice(w.as_slice());
-                }
-            });
+        let weights = (self.rotation, self.stretch);
+        encode_faces(
+            (reference, &self.shares, weights),
+            &polars,
+            |_| back,
+            (rotations, stretches),
+        );
         self.placement.encode(positions, &mean, &[], placement);
         self.lock().push(polars);
     }
@@ -165,26 +154,31 @@ impl Gradients {
     }
 }
 
-/// Writes xx, xy, xz, yy, yz, zz of each triangle's S, times `weight` and share; off-diagonal entries
-/// stand for two and are scaled by the root of 2.
-pub(super) fn encode_stretches(
-    poisson: &Poisson,
-    shares: &[f64],
-    weight: f64,
+/// Writes for each triangle its rotation, turned back by `back`, as a rotation vector, and xx, xy, xz,
+/// yy, yz, zz of its S, where off-diagonal entries stand for two and are scaled by the root of 2; both
+/// times their weight and the triangle's share.
+pub(super) fn encode_faces(
+    (reference, shares, (rotation, stretch)): (&[ReferenceTriangle], &[f64], (f64, f64)),
     polars: &[Polar],
-    stretches: &mut [f64],
+    back: impl Fn(usize) -> UnitQuaternion<f64> + Sync,
+    (rotations, stretches): (&mut [f64], &mut [f64]),
 ) {
-    let reference = poisson.reference();
-    stretches
-        .par_chunks_mut(6 * CHUNK)
+    rotations
+        .par_chunks_mut(3 * CHUNK)
+        .zip(stretches.par_chunks_mut(6 * CHUNK))
         .enumerate()
-        .for_each(|(chunk, stretches)| {
-            for (at, out) in stretches.chunks_exact_mut(6).enumerate() {
+        .for_each(|(chunk, (rotations, stretches))| {
+            let rows = rotations
+                .chunks_exact_mut(3)
+                .zip(stretches.chunks_exact_mut(6));
+            for (at, (turn, entries)) in rows.enumerate() {
                 let face = CHUNK * chunk + at;
-                let s = reference[face].stretch_in_space(polars[face].stretch);
-                let scale = weight * shares[face];
+                let (polar, share) = (&polars[face], shares[face]);
+                let w = log(&(back(face) * polar.rotation)) * (rotation * share);
+                turn.copy_from_slice(w.as_slice());
+                let s = reference[face].stretch_in_space(polar.stretch);
                 for entry in 0..6 {
-                    out[entry] = s[entry] * scale * OFF_DIAGONAL[entry];
+                    entries[entry] = s[entry] * (stretch * share * OFF_DIAGONAL[entry]);
                 }
             }
         });

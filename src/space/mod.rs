@@ -13,6 +13,7 @@
 
 mod gradients;
 mod lengths_angles;
+mod living;
 mod lri;
 mod orientation;
 mod patch_lri;
@@ -57,7 +58,8 @@ pub const MEAN_VERTEX: &str = "mean vertex";
 ///
 /// Weights are lengths: a change that happens everywhere at once (a turn by a small angle, a stretch by
 /// a small factor, a shift) counts as the root of the sum of the squared displacements of all vertices
-/// that it causes. Within a block, triangles count by area and edges by squared length.
+/// that it causes. Within a block, triangles count by area, edges by squared length and pairs of patches by the area that
+/// turns with them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Block {
     /// What they are ("rotation", "scale/shear", ..).

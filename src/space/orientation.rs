@@ -8,7 +8,7 @@ use crate::math::rotation::nearest;
 use crate::mesh::{Polar, ReferenceTriangle};
 
 /// Triangles that one thread takes at a time; sums are taken chunk by chunk in this order.
-const CHUNK: usize = 2048;
+const CHUNK: usize = 512;
 
 /// The polar factors of all triangles of a shape and its mean rotation: the rotation nearest the
 /// area-weighted sum of the triangles' rotations, those without a plane (in the reference or the shape)

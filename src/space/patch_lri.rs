@@ -18,7 +18,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use nalgebra::{Matrix3, UnitQuaternion};
 use rayon::prelude::*;
 
-use super::gradients::{decode_stretch, encode_stretches};
+use super::gradients::{decode_stretch, encode_faces};
 use super::orientation::polar_factors;
 use super::placement::{Placement, blocks_from, follow_rotation, triple};
 use super::registry::State;
@@ -28,8 +28,11 @@ use crate::math::rotation::{exp, log, nearest};
 use crate::math::rotation_graph::RotationGraph;
 use crate::mesh::{Components, Hinges, Poisson, Polar, grow_patches};
 
-/// Triangles that one thread takes at a time.
+/// Triangles whose branches one thread draws at a time.
 const CHUNK: usize = 2048;
+
+/// The least share of a pair: patches of no area to speak of have a say beyond rounding.
+const LEAST_SHARE: f64 = 1e-12;
 
 /// Poses that patches are grown on; of more, these many spread evenly.
 const POSES: usize = 8;
@@ -41,11 +44,14 @@ pub struct PatchLri {
     patches: Vec<Patch>,
     /// The patch of each triangle.
     patch: Vec<u32>,
+    /// Where each patch's triangles begin, and the triangles patch by patch.
+    members: (Vec<u32>, Vec<u32>),
     graph: RotationGraph,
     /// Root of each triangle's share in the area.
     shares: Vec<f64>,
+    /// Root of each pair's share ([`pair_shares`]).
+    pair_shares: Vec<f64>,
     rotation: f64,
-    pair: f64,
     stretch: f64,
     placement: Placement,
     groups: usize,
@@ -117,15 +123,16 @@ impl PatchLri {
         for patch in &patches {
             group_shares[patch.group] += patch.area / total;
         }
+        let graph = RotationGraph::new(count, links, weights.clone())?;
         Ok(PatchLri {
             shares: area_shares(poisson.reference()),
+            pair_shares: pair_shares(&graph, &weights, &patches, groups.count()),
             rotation: scales.rotation(),
-            // a joint is a cut through a few pairs: together they count as the turn of one side
-            pair: scales.rotation() * (count as f64 / links.len().max(1) as f64).sqrt(),
             stretch: scales.stretch(),
             placement: Placement::new(components, &group_shares, &scales),
-            graph: RotationGraph::new(count, links, weights)?,
+            graph,
             groups: groups.count(),
+            members: members(&patch, count),
             patches,
             patch,
             poisson,
@@ -147,17 +154,18 @@ impl PatchLri {
 
     /// The rotation of each patch.
     fn patch_rotations(&self, polars: &[Polar]) -> Vec<UnitQuaternion<f64>> {
-        let mut sums = vec![Matrix3::zeros(); self.patches.len()];
-        let faces = self
-            .patch
-            .iter()
-            .zip(polars)
-            .zip(&self.poisson.reference()[..]);
-        for ((&patch, polar), triangle) in faces {
-            let turn = polar.rotation.to_rotation_matrix();
-            sums[patch as usize] += turn.matrix() * triangle.area();
-        }
-        sums.iter().map(|sum| nearest(sum).rotation).collect()
+        let reference = self.poisson.reference();
+        (0..self.patches.len())
+            .into_par_iter()
+            .map(|patch| {
+                let range = self.members.0[patch] as usize..self.members.0[patch + 1] as usize;
+                let turns = self.members.1[range].iter().map(|&face| {
+                    let turn = polars[face as usize].rotation.to_rotation_matrix();
+                    turn.matrix() * reference[face as usize].area()
+                });
+                nearest(&turns.sum()).rotation
+            })
+            .collect()
     }
 
     /// The mean rotation of each group and of the whole, from those of the patches.
@@ -178,8 +186,9 @@ impl PatchLri {
 
     /// The rotations of the patches, turned back by the mean rotation, from the pairs' and groups'.
     fn solve_patches(&self, pairs: &[f64], placement: &[f64]) -> Vec<UnitQuaternion<f64>> {
-        let relative: Vec<_> = (0..self.graph.links().len())
-            .map(|pair| exp(&(triple(pairs, pair) / self.pair)))
+        let shares = self.pair_shares.iter().enumerate();
+        let relative: Vec<_> = shares
+            .map(|(pair, share)| exp(&(triple(pairs, pair) / (self.rotation * share))))
             .collect();
         let mut turns = vec![UnitQuaternion::identity(); self.patches.len()];
         self.graph.solve(&relative, &|_| true, &mut turns);
@@ -221,7 +230,7 @@ impl ShapeSpace for PatchLri {
         let bare = [
             ("rotation in patch", stretches, self.rotation),
             ("scale/shear", pairs - stretches, self.stretch),
-            ("patch rotation", placement - pairs, self.pair),
+            ("patch rotation", placement - pairs, self.rotation),
         ];
         let mut blocks = blocks_from(0, &bare);
         blocks.extend(self.placement.blocks(placement));
@@ -245,26 +254,16 @@ impl ShapeSpace for PatchLri {
         let (pairs, rest) = rest.split_at_mut(placement - pairs);
         let (rotations, stretches) = coordinates.split_at_mut(stretches);
         let back: Vec<_> = turns.iter().map(UnitQuaternion::inverse).collect();
-        rotations
-            .par_chunks_mut(3 * CHUNK)
-            .enumerate()
-            .for_each(|(chunk, rotations)| {
-                for (at, out) in rotations.chunks_exact_mut(3).enumerate() {
-                    let face = CHUNK * chunk + at;
-                    let relative = back[self.patch[face] as usize] * polars[face].rotation;
-                    let w = log(&relative) * (self.rotation * self.shares[face]);
-                    out.copy_from_slice(w.as_slice());
-                }
-            });
-        encode_stretches(
-            &self.poisson,
-            &self.shares,
-            self.stretch,
+        let weights = (self.rotation, self.stretch);
+        encode_faces(
+            (self.poisson.reference(), &self.shares, weights),
             &polars,
-            stretches,
+            |face| back[self.patch[face] as usize],
+            (rotations, stretches),
         );
-        for (out, &[i, j]) in pairs.chunks_exact_mut(3).zip(self.graph.links()) {
-            let w = log(&(back[i as usize] * turns[j as usize])) * self.pair;
+        let links = self.graph.links().iter().zip(&self.pair_shares);
+        for (out, (&[i, j], share)) in pairs.chunks_exact_mut(3).zip(links) {
+            let w = log(&(back[i as usize] * turns[j as usize])) * (self.rotation * share);
             out.copy_from_slice(w.as_slice());
         }
         let (groups, mean) = self.means(&turns);
@@ -285,7 +284,8 @@ impl ShapeSpace for PatchLri {
         let patches = coordinates[pairs..placement]
             .chunks_exact_mut(3)
             .zip(near[pairs..placement].chunks_exact(3))
-            .map(|(at, near)| follow_rotation(near, at, self.pair))
+            .zip(&self.pair_shares)
+            .map(|((at, near), share)| follow_rotation(near, at, self.rotation * share))
             .filter(|large| *large)
             .count();
         let rest = &mut coordinates[placement..];
@@ -325,6 +325,58 @@ fn adjacent(hinges: &Hinges, patch: &[u32]) -> (Vec<[u32; 2]>, Vec<f64>) {
         .chunk_by(|a, b| a == b)
         .map(|run| (run[0], run.len() as f64))
         .unzip()
+}
+
+/// Where the triangles of each patch begin in a list of all, and that list, patch by patch.
+fn members(patch: &[u32], count: usize) -> (Vec<u32>, Vec<u32>) {
+    let mut starts = vec![0_u32; count + 1];
+    patch.iter().for_each(|&p| starts[p as usize + 1] += 1);
+    for p in 0..count {
+        starts[p + 1] += starts[p];
+    }
+    let mut next = starts.clone();
+    let mut triangles = vec![0; patch.len()];
+    for (triangle, &p) in patch.iter().enumerate() {
+        triangles[next[p as usize] as usize] = triangle as u32;
+        next[p as usize] += 1;
+    }
+    (starts, triangles)
+}
+
+/// Root of the share of each pair of patches in the motion of the mesh: what turns when the pair alone
+/// says so, as a share of the area, over the part of it that the pairs beside it let happen.
+///
+/// A unit turn of pair l makes the patches turn by x_l = L^-1 w_l (e_j - e_i), where L is the Laplacian
+/// of the pairs, and the pair itself by its leverage t_l = x_l(j) - x_l(i), 1 where nothing else joins
+/// its two sides. A joint that is cut by c equal pairs bends when all of them do, each with t = 1/c and
+/// the area-weighted variance of x equal to s/c^2 for sides with shares that make s: so with squared
+/// weights variance / t the pairs of a joint count together as the turn of what they move.
+fn pair_shares(
+    graph: &RotationGraph,
+    weights: &[f64],
+    patches: &[Patch],
+    groups: usize,
+) -> Vec<f64> {
+    let total: f64 = patches.iter().map(|patch| patch.area).sum();
+    let share = |&[i, j]: &[u32; 2], weight: f64| -> f64 {
+        let (i, j) = (i as usize, j as usize);
+        let mut x = vec![0.0; patches.len()];
+        (x[i], x[j]) = (-weight, weight);
+        graph.factor().solve(1, &mut x);
+        let mut sums = vec![[0.0; 3]; groups];
+        for (patch, x) in patches.iter().zip(&x) {
+            let [area, first, second] = &mut sums[patch.group];
+            *area += patch.area;
+            *first += patch.area * x;
+            *second += patch.area * x * x;
+        }
+        // a pair moves its own group only; elsewhere x is zero
+        let [area, first, second] = sums[patches[i].group];
+        let variance = (second - first * first / area) / total;
+        (variance / (x[j] - x[i])).max(LEAST_SHARE).sqrt()
+    };
+    let links = graph.links().iter().zip(weights);
+    links.map(|(link, &weight)| share(link, weight)).collect()
 }
 
 /// The middle of each triangle, in units of the largest extent of the mesh.

@@ -1,7 +1,9 @@
 //! All shape spaces by name, and what they share.
 
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::{Arc, OnceLock};
 
+use super::living::Living;
 use super::{Block, Gradients, LengthsAngles, Lri, PatchLri, ShapeSpace, SpaceError, Vertices};
 use crate::mesh::{
     Hinges, Poisson, PoissonAnalysis, ReferenceTriangle, Topology, reference_triangles,
@@ -13,8 +15,33 @@ pub struct SpaceKind {
     pub name: &'static str,
     /// What it stores and when to use it, one line.
     pub summary: &'static str,
+    shared: Sharing,
     build: Build,
 }
+
+/// When two spaces of a kind about the same reference pose are the same space.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Sharing {
+    /// There is nothing worth sharing.
+    Never,
+    /// Always.
+    Always,
+    /// When they were adapted to the same poses, or have the same patches.
+    SamePoses,
+}
+
+/// What a space in use was made for.
+struct Made {
+    kind: &'static str,
+    topology: Arc<Topology>,
+    reference: Arc<[f64]>,
+    /// A fingerprint of the poses that it was adapted to, where it was.
+    poses: Option<u64>,
+}
+
+static SPACES_IN_USE: Living<Made, dyn ShapeSpace> = Living::new();
+static ANALYSES_IN_USE: Living<(), PoissonAnalysis> = Living::new();
+static SYSTEMS_IN_USE: Living<(), Poisson> = Living::new();
 
 /// Makes a space for given poses, or as an earlier one of its kind described itself.
 type Build = fn(&Spaces, &[&[f64]], Option<&State>) -> Result<Arc<dyn ShapeSpace>, SpaceError>;
@@ -25,11 +52,13 @@ pub const SPACES: &[SpaceKind] = &[
     SpaceKind {
         name: "vertices",
         summary: "positions: exact and fast, for frames close together",
+        shared: Sharing::Never,
         build: |spaces, _, _| Ok(Arc::new(Vertices::new(spaces.vertices()))),
     },
     SpaceKind {
         name: "gradients",
         summary: "rotation and stretch of each triangle: for transfer and large motions",
+        shared: Sharing::Always,
         build: |spaces, _, _| {
             Ok(Arc::new(Gradients::new(
                 spaces.poisson()?,
@@ -40,16 +69,19 @@ pub const SPACES: &[SpaceKind] = &[
     SpaceKind {
         name: "lri",
         summary: "edges in the frames of their ends: for local motions of any size",
+        shared: Sharing::Always,
         build: lri,
     },
     SpaceKind {
         name: "patch-lri",
         summary: "rotations relative to patches, patches to each other: for the largest motions",
+        shared: Sharing::SamePoses,
         build: patch_lri,
     },
     SpaceKind {
         name: "lengths-angles",
         summary: "edge lengths and dihedral angles: for blends that keep lengths and folds",
+        shared: Sharing::Always,
         build: |spaces, _, _| {
             let (poisson, hinges) = (spaces.poisson()?, spaces.hinges()?);
             Ok(Arc::new(LengthsAngles::new(
@@ -117,7 +149,8 @@ impl State {
 }
 
 /// What the spaces of one connectivity and one reference pose share: each factor is made when first
-/// needed and only once.
+/// needed and only once. As long as anyone holds a space, another [`Spaces`] of the same connectivity and
+/// reference finds it and its factors too.
 pub struct Spaces {
     topology: Arc<Topology>,
     reference: Arc<[f64]>,
@@ -166,7 +199,13 @@ impl Spaces {
     /// # Errors
     /// [`SpaceError`]; an unknown name is unsuitable.
     pub fn open(&self, name: &str, poses: &[&[f64]]) -> Result<Arc<dyn ShapeSpace>, SpaceError> {
-        (kind(name)?.build)(self, poses, None)
+        let kind = kind(name)?;
+        let adapted = match kind.shared {
+            Sharing::SamePoses => Some(fingerprint(poses)),
+            Sharing::Never | Sharing::Always => None,
+        };
+        let build = || (kind.build)(self, poses, None);
+        self.shared(kind, adapted, |made, _| made.poses == adapted, build)
     }
 
     /// The space that had this state, its reference being that of `self` ([`Spaces::of_state`]).
@@ -175,7 +214,12 @@ impl Spaces {
     /// As [`Spaces::open`]; also when the state does not fit the connectivity, or was written with
     /// other block weights than the reference gives.
     pub fn restore(&self, state: &State) -> Result<Arc<dyn ShapeSpace>, SpaceError> {
-        let space = (kind(&state.name)?.build)(self, &[], Some(state))?;
+        let kind = kind(&state.name)?;
+        let build = || (kind.build)(self, &[], Some(state));
+        let same = |_: &Made, space: &(dyn ShapeSpace + 'static)| {
+            kind.shared == Sharing::Always || space.state().patches == state.patches
+        };
+        let space = self.shared(kind, None, same, build)?;
         let blocks = space.blocks();
         let same = blocks.len() == state.weights.len()
             && blocks
@@ -191,6 +235,32 @@ impl Spaces {
                 ),
             }),
         }
+    }
+
+    /// A space of this connectivity and reference that is in use already, or a new one.
+    fn shared(
+        &self,
+        kind: &SpaceKind,
+        poses: Option<u64>,
+        same: impl Fn(&Made, &(dyn ShapeSpace + 'static)) -> bool,
+        build: impl FnOnce() -> Result<Arc<dyn ShapeSpace>, SpaceError>,
+    ) -> Result<Arc<dyn ShapeSpace>, SpaceError> {
+        if kind.shared == Sharing::Never {
+            return build();
+        }
+        let fits = |made: &Made, space: &(dyn ShapeSpace + 'static)| {
+            made.kind == kind.name
+                && made.reference == self.reference
+                && made.topology.same_connectivity(&self.topology)
+                && same(made, space)
+        };
+        let made = || Made {
+            kind: kind.name,
+            topology: Arc::clone(&self.topology),
+            reference: self.reference(),
+            poses,
+        };
+        SPACES_IN_USE.find_or(fits, || Ok((made(), build()?)))
     }
 
     /// Spaces about the reference pose of a stored space.
@@ -219,11 +289,13 @@ impl Spaces {
 
     /// The connectivity, analysed.
     fn analysis(&self) -> Result<Arc<PoissonAnalysis>, SpaceError> {
-        let analyse = || {
-            let triangles = self.topology.triangles();
-            Ok(PoissonAnalysis::new(self.vertices(), triangles)?)
+        let triangles = self.topology.triangles();
+        let same = |_: &(), found: &PoissonAnalysis| {
+            found.vertices() == self.vertices() && found.triangles() == triangles
         };
-        self.analysis.get_or_init(analyse).clone()
+        let analyse = || Ok(((), PoissonAnalysis::new(self.vertices(), triangles)?));
+        let init = || ANALYSES_IN_USE.find_or(same, analyse);
+        self.analysis.get_or_init(init).clone()
     }
 
     /// The triangles of the reference pose.
@@ -234,8 +306,16 @@ impl Spaces {
 
     /// The factored system that finds positions from gradients.
     fn poisson(&self) -> Result<Arc<Poisson>, SpaceError> {
-        let factor = || Ok(Arc::new(Poisson::new(self.analysis()?, self.rest())?));
-        self.poisson.get_or_init(factor).clone()
+        let init = || {
+            let (analysis, rest) = (self.analysis()?, self.rest());
+            let same = |_: &(), found: &Poisson| {
+                Arc::ptr_eq(found.analysis(), &analysis) && found.reference()[..] == rest[..]
+            };
+            let (analysis, rest) = (Arc::clone(&analysis), Arc::clone(&rest));
+            let factor = || Ok(((), Arc::new(Poisson::new(analysis, rest)?)));
+            SYSTEMS_IN_USE.find_or(same, factor)
+        };
+        self.poisson.get_or_init(init).clone()
     }
 
     /// The edges and the pairs of triangles at them.
@@ -247,6 +327,16 @@ impl Spaces {
         };
         Ok(Arc::clone(self.hinges.get_or_init(collect)))
     }
+}
+
+/// Of poses that a space adapts to. Were two sets ever confused, the space would still be one of its kind.
+fn fingerprint(poses: &[&[f64]]) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    for pose in poses {
+        pose.len().hash(&mut hasher);
+        pose.iter().for_each(|x| x.to_bits().hash(&mut hasher));
+    }
+    hasher.finish()
 }
 
 fn kind(name: &str) -> Result<&'static SpaceKind, SpaceError> {
