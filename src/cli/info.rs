@@ -7,7 +7,7 @@ use super::report;
 use super::session::{Outcome, Session};
 use crate::diag::Result;
 use crate::mesh::Bounds;
-use crate::pipeline::{SpaceReport, best_space, compare_spaces, describe};
+use crate::pipeline::{SpaceReport, best_space, compare_spaces, describe, why_best_space};
 
 /// Say what a capture holds
 #[derive(Debug, clap::Args)]
@@ -53,6 +53,7 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<Outcome> {
         let seconds = session.progress.seconds(&names);
         object["spaces"] = found.iter().map(|space| as_data(space, &seconds)).collect();
         object["best_space"] = json!(best_space(&found).map(|space| space.name));
+        object["why"] = json!(why_best_space(&found));
         text += &spaces_table(session, &found, &seconds);
     }
     Ok(Outcome {
@@ -77,11 +78,15 @@ fn spaces_table(session: &Session, found: &[SpaceReport], seconds: &Value) -> St
             let size = report::bytes(8 * space.numbers as u64);
             let took = report::number(seconds[space.name].as_f64().unwrap_or(0.0));
             let text = format!(
-                "psi {:<8} linear {:<8} cubic {:<8} m = {:<4} {size:>9} {took:>6} s",
+                "psi {:<8} linear {:<8} cubic {:<8} m = {:<4} {size:>9} {took:>6} s{}",
                 of(space.psi),
                 of(space.linear),
                 of(space.cubic),
                 space.modes,
+                match space.large_turns {
+                    0 => String::new(),
+                    turns => format!("  {turns} turns in doubt"),
+                },
             );
             (space.name, text)
         })
@@ -89,7 +94,8 @@ fn spaces_table(session: &Session, found: &[SpaceReport], seconds: &Value) -> St
     let title = "between frames, in vertex positions";
     let mut text = report::table(session.style, title, &rows);
     if let Some(best) = best_space(found) {
-        text += &format!("  {} suits it best: {}\n", best.name, best.summary);
+        text += &format!("  {} suits it best ({})\n", best.name, best.summary);
+        text += &format!("  {}\n", why_best_space(found).unwrap_or_default());
     }
     text
 }

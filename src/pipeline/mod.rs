@@ -48,7 +48,7 @@ pub use picture::{PictureFormat, save_picture};
 pub use request::FitRequest;
 pub use save::{Saved, save};
 pub use sheet::contact_sheet;
-pub use spaces::{SpaceReport, best_space, compare_spaces};
+pub use spaces::{SpaceReport, best_space, compare_spaces, why as why_best_space};
 pub use statistics::{
     SAMPLES, Statistics, StatisticsReport, StatisticsRequest, add_difference, statistics,
 };

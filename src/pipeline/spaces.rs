@@ -96,6 +96,54 @@ pub fn best_space(reports: &[SpaceReport]) -> Option<&SpaceReport> {
     near.min_by_key(|report| report.numbers)
 }
 
+/// Why [`best_space`] suits the capture, and what speaks against it, in sentences; none without reports.
+pub fn why(reports: &[SpaceReport]) -> Option<String> {
+    let best = best_space(reports)?;
+    let percent = |error: f64| format!("{:.3} %", 100.0 * error);
+    let least = reports.iter().min_by(|a, b| a.psi.total_cmp(&b.psi))?;
+    let times = |numbers: usize| numbers as f64 / best.numbers.max(1) as f64;
+    let mut text = match least.name == best.name {
+        true => format!("no space errs less between frames ({})", percent(best.psi)),
+        false => format!(
+            "it errs by {} between frames, {} by {} but with {:.1} times its numbers",
+            percent(best.psi),
+            least.name,
+            percent(least.psi),
+            times(least.numbers),
+        ),
+    };
+    let plain = reports.iter().find(|report| report.name == "vertices");
+    if let Some(plain) = plain.filter(|plain| plain.name != best.name && plain.psi > best.psi) {
+        text += &format!(
+            "; vertices, which shrink what turns, err by {} with {:.2} times its numbers",
+            percent(plain.psi),
+            times(plain.numbers),
+        );
+    }
+    let doubtful: Vec<&str> = reports
+        .iter()
+        .filter(|report| report.large_turns > 0)
+        .map(|report| report.name)
+        .collect();
+    if !doubtful.is_empty() {
+        text += &format!(
+            "; the frames kept are more than 150 degrees apart in places, where {} guess which way round",
+            doubtful.join(", ")
+        );
+    }
+    if best.linear < 0.9 * best.psi {
+        text += &format!(
+            "; even so a straight line between frames errs less ({}): little moves smoothly at half the rate",
+            percent(best.linear)
+        );
+    }
+    if best.name == "vertices" {
+        text +=
+            "; for transfer or exaggeration gradients keep limbs in shape where vertices do not";
+    }
+    Some(text)
+}
+
 fn measure(
     sequence: &Sequence,
     space: &dyn ShapeSpace,
@@ -200,4 +248,54 @@ fn doubles(sequence: &Sequence, frame: usize) -> Vec<f64> {
         .iter()
         .map(|&x| f64::from(x))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn report(name: &'static str, psi: f64, numbers: usize, large_turns: usize) -> SpaceReport {
+        SpaceReport {
+            name,
+            summary: "",
+            dimension: 0,
+            modes: 1,
+            numbers,
+            psi,
+            linear: 2.0 * psi,
+            cubic: psi,
+            large_turns,
+        }
+    }
+
+    #[test]
+    fn the_smallest_of_those_that_err_alike_is_chosen_and_the_reason_told() {
+        let found = [
+            report("vertices", 0.0105, 100, 0),
+            report("gradients", 0.01, 300, 7),
+        ];
+        assert_eq!(best_space(&found).unwrap().name, "vertices");
+        let text = why(&found).unwrap();
+        assert!(
+            text.contains("gradients by 1.000 % but with 3.0 times its numbers"),
+            "{text}"
+        );
+        assert!(text.contains("where gradients guess"), "{text}");
+    }
+
+    #[test]
+    fn a_space_that_errs_much_less_is_worth_its_numbers() {
+        let found = [
+            report("vertices", 0.04, 100, 0),
+            report("gradients", 0.01, 300, 0),
+        ];
+        assert_eq!(best_space(&found).unwrap().name, "gradients");
+        let text = why(&found).unwrap();
+        assert!(text.contains("no space errs less"), "{text}");
+        assert!(
+            text.contains("vertices, which shrink what turns, err by 4.000 %"),
+            "{text}"
+        );
+        assert!(why(&[]).is_none() && best_space(&[]).is_none());
+    }
 }
