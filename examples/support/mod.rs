@@ -26,32 +26,45 @@ use meshloom::view::{self, Camera, Style, Surface};
 pub(crate) struct Figure {
     name: &'static str,
     capture: Option<PathBuf>,
+    others: Vec<PathBuf>,
     folder: PathBuf,
     missed: usize,
 }
 
 /// Runs `draw`: exit code 0, or 1 if it failed or missed a goal.
 pub(crate) fn run(name: &'static str, draw: impl FnOnce(&mut Figure) -> Result<()>) -> ExitCode {
+    run_with(name, &["CAPTURE"], draw)
+}
+
+/// As [`run`] for a figure of several inputs: all or none of them are given on the command line.
+pub(crate) fn run_with(
+    name: &'static str,
+    inputs: &[&str],
+    draw: impl FnOnce(&mut Figure) -> Result<()>,
+) -> ExitCode {
+    let usage = || {
+        eprintln!("usage: {name} [{}] [--out FOLDER]", inputs.join(" "));
+        ExitCode::from(2)
+    };
     let mut arguments = std::env::args_os().skip(1);
     let mut figure = Figure {
         name,
         capture: None,
+        others: Vec::new(),
         folder: PathBuf::from("target/figures"),
         missed: 0,
     };
     while let Some(argument) = arguments.next() {
         match (argument.to_str(), &figure.capture) {
             (Some("--out"), _) => figure.folder = arguments.next().unwrap_or_default().into(),
-            (Some(option), _) if option.starts_with('-') => {
-                eprintln!("usage: {name} [CAPTURE] [--out FOLDER]");
-                return ExitCode::from(2);
-            }
+            (Some(option), _) if option.starts_with('-') => return usage(),
             (_, None) => figure.capture = Some(argument.into()),
-            (_, Some(_)) => {
-                eprintln!("usage: {name} [CAPTURE] [--out FOLDER]");
-                return ExitCode::from(2);
-            }
+            (_, Some(_)) => figure.others.push(argument.into()),
         }
+    }
+    let given = usize::from(figure.capture.is_some()) + figure.others.len();
+    if given != 0 && given != inputs.len() {
+        return usage();
     }
     match draw(&mut figure) {
         Ok(()) if figure.missed == 0 => ExitCode::SUCCESS,
@@ -67,16 +80,17 @@ impl Figure {
     /// The capture of the command line, or else the demo of that name; and how to look at it.
     pub(crate) fn capture(&self, demo: &str) -> Result<(Sequence, View)> {
         let (sequence, direction) = match (&self.capture, Demo::find(demo)) {
-            (Some(path), _) => {
-                let opened = pipeline::open(&Disk, &InputSpec::new(path), &Task::default())?;
-                let sequence = opened.output.content.sequence(&Task::default())?;
-                (sequence, [0.6, 0.25])
-            }
+            (Some(path), _) => (open(path)?, [0.6, 0.25]),
             (None, Some(demo)) => ((demo.generate)(), demo.view),
             (None, None) => return Diagnostic::error(format!("no demo `{demo}`")).err(),
         };
         let view = View::looking(&sequence, direction);
         Ok((sequence, view))
+    }
+
+    /// The inputs after the capture.
+    pub(crate) fn others(&self) -> Result<Vec<Sequence>> {
+        self.others.iter().map(open).collect()
     }
 
     /// Whether the capture is the demo, whose numbers are known.
@@ -99,6 +113,11 @@ impl Figure {
         }
         PictureFormat::of(&self.folder.join("a.png")).map(|_| ())
     }
+}
+
+fn open(path: &PathBuf) -> Result<Sequence> {
+    let opened = pipeline::open(&Disk, &InputSpec::new(path), &Task::default())?;
+    opened.output.content.sequence(&Task::default())
 }
 
 /// Fits `sequence` with given k, l, m.
@@ -149,6 +168,7 @@ pub(crate) struct View {
 }
 
 impl View {
+    /// Such that all frames fill the picture.
     pub(crate) fn looking(sequence: &Sequence, [yaw, pitch]: [f64; 2]) -> Self {
         let mut camera = Camera {
             yaw,
@@ -162,6 +182,11 @@ impl View {
             camera,
             topology: sequence.topology().clone(),
         }
+    }
+
+    /// Yaw and pitch.
+    pub(crate) fn direction(&self) -> [f64; 2] {
+        [self.camera.yaw, self.camera.pitch]
     }
 
     /// A shape (3V coordinates) on a clear background, `side` x `side` pixels of colour `front`.

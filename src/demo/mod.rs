@@ -20,6 +20,7 @@ use crate::mesh::Sequence;
 
 pub use bar::pose as bar_pose;
 pub use face::NAMES as FACE_POSES;
+pub use horse::{Build, horse_gallop, horse_poses};
 
 /// What the frames of a capture are to each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -8,6 +8,8 @@ use nalgebra::Vector3;
 
 use crate::demo::implicit::{Blob, Part};
 
+use super::Build;
+
 pub(super) const PELVIS: usize = 0;
 pub(super) const LOIN: usize = 1;
 pub(super) const THORAX: usize = 2;
@@ -71,7 +73,7 @@ pub(super) const LUMBOSACRAL: [f64; 2] = [-0.42, 1.40];
 pub(super) const LUMBAR: [f64; 2] = [-0.15, 1.38];
 
 /// Where the flesh is.
-pub(super) fn flesh() -> Vec<Part> {
+pub(super) fn flesh(build: Build) -> Vec<Part> {
     let mut parts = vec![];
     parts.extend(trunk());
     parts.extend(neck_and_head());
@@ -87,7 +89,23 @@ pub(super) fn flesh() -> Vec<Part> {
             .flat_map(|part| both(&part, &FORE[1], &FORE[0])),
     );
     parts.extend(both(&ear(), &EARS[1..], &EARS[..1]));
-    parts.into_iter().map(Part::new).collect()
+    let grown = |part: Vec<Blob>| part.iter().map(|blob| grown(blob, build)).collect();
+    parts.into_iter().map(grown).map(Part::new).collect()
+}
+
+/// A blob of the riding horse as that build has it: heavy limbs, a barrel of a trunk, feathered hooves.
+fn grown(blob: &Blob, build: Build) -> Blob {
+    let factor = match (build, blob.bone) {
+        (Build::Light, _) => 1.0,
+        (Build::Heavy, PELVIS | LOIN | THORAX) => 1.10,
+        (Build::Heavy, bone) if HIND.iter().flatten().any(|&part| part == bone) => 1.45,
+        (Build::Heavy, bone) if FORE.iter().flatten().any(|&part| part == bone) => 1.45,
+        (Build::Heavy, _) => 1.2,
+    };
+    Blob {
+        radii: blob.radii.map(|radius| factor * radius),
+        ..*blob
+    }
 }
 
 /// A row of blobs on the right, whose bones count within the limb, as the same on both sides.

@@ -7,10 +7,15 @@ use crate::demo::skin::Skin;
 use crate::demo::surface_nets::{Grid, polygonise};
 use crate::mesh::Topology;
 
-use super::anatomy;
+use super::{Build, anatomy};
 
 /// Side of the cubes that the skin is found with, in metres.
-const STEP: f64 = 0.030;
+const fn step(build: Build) -> f64 {
+    match build {
+        Build::Light => 0.030,
+        Build::Heavy => 0.036,
+    }
+}
 /// Radius that thin limbs are thickened to while they are cut into faces, so that they get enough.
 const THIN: f64 = 0.05;
 /// Radius of fillets.
@@ -34,12 +39,12 @@ impl Field for Standing {
 
 impl Body {
     /// Cut thick, then drawn tight.
-    pub(super) fn new() -> Self {
+    pub(super) fn new(build: Build) -> Self {
         let flesh = Flesh {
-            parts: anatomy::flesh(),
+            parts: anatomy::flesh(build),
             blend: BLEND,
         };
-        let grid = Grid::uniform([-1.4, -0.15, -0.45], [1.65, 2.2, 0.45], STEP);
+        let grid = Grid::uniform([-1.4, -0.15, -0.45], [1.65, 2.2, 0.45], step(build));
         let mut mesh = polygonise(&Standing(flesh.thickened(THIN)), &grid);
         mesh.relax(&Standing(flesh.clone()), 8);
         let neighbours = mesh.neighbours();

@@ -63,6 +63,22 @@ impl Gait {
         stance
     }
 
+    /// A horse at rest but for one leg (left hind, right hind, left fore, right fore), which is where it
+    /// comes at `time` of its step: standing from 0 to 1, swinging from 1 to 2.
+    pub(super) fn one_leg(&self, leg: usize, time: f64) -> Stance {
+        let mut stance = Stance::default();
+        match leg {
+            0 | 1 => stance.hind[leg] = self.hind.foot(time, 1.0),
+            _ => stance.fore[leg - 2] = self.fore.foot(time, 1.0),
+        }
+        stance
+    }
+
+    /// A horse with the trunk, neck and tail of a phase, its feet at rest.
+    pub(super) fn trunk_only(&self, phase: f64) -> Stance {
+        (self.trunk)(phase)
+    }
+
     /// Phase since touchdown to \[0, 2): stand, swing.
     fn leg_time(&self, phase: f64) -> f64 {
         let phase = phase - libm::floor(phase);

@@ -1,3 +1,4 @@
+use super::{Build, horse_gallop, horse_poses};
 use crate::demo::tests::{capture, is_closed_manifold, smallest_face_share};
 use crate::mesh::FrameSource;
 
@@ -87,4 +88,28 @@ fn standing_feet_do_not_slide() {
     }
     let travelled = walk.frame(walk.frames() - 1)[0] - walk.frame(0)[0];
     assert!(travelled > 3.0, "two and a half strides of 1.35 m");
+}
+
+/// Both builds take the same ten poses and gallop alike, on meshes that differ.
+#[test]
+fn builds_have_bones_in_common_and_faces_of_their_own() {
+    let [light, heavy] = [Build::Light, Build::Heavy].map(horse_poses);
+    assert!(is_closed_manifold(heavy.topology()));
+    assert!(!heavy.topology().same_connectivity(light.topology()));
+    assert_eq!((light.frames(), heavy.frames()), (10, 10));
+    assert!(
+        light
+            .topology()
+            .same_connectivity(capture("gallop").topology())
+    );
+    let middle = |sequence: &crate::mesh::Sequence, frame: usize| {
+        let points = sequence.frame(frame).as_chunks::<3>().0;
+        points.iter().map(|p| f64::from(p[0])).sum::<f64>() / points.len() as f64
+    };
+    // a leg that swings takes the middle of either with it
+    for frame in 1..9 {
+        let shift = [&light, &heavy].map(|horse| middle(horse, frame) - middle(horse, 0));
+        assert!(shift[0] * shift[1] > 0.0, "pose {frame}: {shift:?}");
+    }
+    assert_eq!(horse_gallop(Build::Heavy).frames(), 60);
 }
