@@ -1,6 +1,7 @@
 //! What the real binary sends to a terminal: how much, and that pictures in it can be decoded.
 
 use std::io::{Read, Write};
+use std::num::NonZero;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 use std::thread;
@@ -82,6 +83,22 @@ impl Terminal {
         while !there() {
             assert!(start.elapsed() < PATIENCE, "never sent: {wanted}");
             thread::sleep(Duration::from_millis(5));
+        }
+    }
+
+    /// Waits until the screen shows `wanted`.
+    fn see(&self, wanted: &str) {
+        let start = Instant::now();
+        let size = |count: u16| NonZero::new(count).expect("a screen has cells");
+        loop {
+            let mut screen = vt100::Parser::new(size(SIZE.rows), size(SIZE.cols), 0);
+            screen.process(&self.bytes.lock().unwrap());
+            let text = screen.screen().contents();
+            if text.contains(wanted) {
+                return;
+            }
+            assert!(start.elapsed() < PATIENCE, "never shown: {wanted}\n{text}");
+            thread::sleep(Duration::from_millis(20));
         }
     }
 
@@ -255,7 +272,7 @@ fn what_lands_in_a_watched_folder_is_listed_and_opened() {
         "0.1",
     ];
     let mut terminal = Terminal::open(folder.path(), &arguments, &[]);
-    terminal.wait("nothing has landed yet");
+    terminal.see("nothing has landed yet");
     let capture = captures.join("bend");
     std::fs::create_dir(&capture).unwrap();
     for frame in 0..6 {
@@ -263,15 +280,10 @@ fn what_lands_in_a_watched_folder_is_listed_and_opened() {
         let mesh = format!("v 0 0 0\nv 1 0 {height}\nv 1 1 0\nv 0 1 {height}\nf 1 2 3\nf 1 3 4\n");
         std::fs::write(capture.join(format!("f{frame}.obj")), mesh).unwrap();
     }
-    terminal.wait("bend");
-    terminal.wait("done");
-    terminal.after("\r");
-    terminal.wait("frame 1.00/6");
-    terminal.settle();
-    let list = terminal.after("q");
-    assert!(
-        String::from_utf8_lossy(&list).contains("bend"),
-        "back at the list"
-    );
+    terminal.see("done      bend");
+    terminal.press("\r");
+    terminal.see("frame 1.00/6");
+    terminal.press("q");
+    terminal.see("done      bend");
     terminal.quit();
 }

@@ -105,7 +105,8 @@ fn studio(
 ) -> Result<Outcome> {
     let options = options(shown.name.clone(), graphics);
     session.progress.end();
-    tui::run(&options, Arc::new(shown), Arc::new(desk), &session.task)?;
+    let desk: Arc<dyn tui::Desk> = Arc::new(desk);
+    tui::run(&options, Arc::new(shown), &desk, &session.task)?;
     Ok(Outcome::default())
 }
 

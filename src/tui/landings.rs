@@ -88,7 +88,7 @@ pub fn watch(
                     ..options.clone()
                 };
                 let (files, desk) = open(&chosen, part);
-                run(&options, files, desk, task)?;
+                run(&options, files, &desk, task)?;
             }
         }
     }

@@ -191,7 +191,7 @@ pub(super) enum Aspect {
     Plain,
     /// How far each vertex is from the capture's, as colour.
     Errors,
-    /// The loom as it was first there beside what became of it.
+    /// The capture, or the loom as it was first there, beside what became of it.
     Before,
 }
 

@@ -107,11 +107,15 @@ impl Options {
 pub fn run(
     options: &Options,
     files: Arc<dyn Files>,
-    desk: Arc<dyn Desk>,
+    desk: &Arc<dyn Desk>,
     task: &Task,
 ) -> Result<()> {
     let screen = size().map_err(lost)?;
     terminal::take().map_err(lost)?;
+    let (send, receive) = mpsc::channel();
+    let cancel = Task::default();
+    // Files are read while the terminal is waited for.
+    start_opening(&files, desk, &send, &cancel);
     let answers = terminal::ask(options.tmux);
     let choice = choose(options.graphics, &answers, options.tmux, options.colour);
     let dark = answers.background.is_none_or(is_dark);
@@ -121,8 +125,8 @@ pub fn run(
     };
     let mut state = State::new(options.name.clone(), screen, choice.cell, look);
     state.plain_letters = choice.protocol == Protocol::Ascii;
-    let (send, receive) = mpsc::channel();
-    let mut studio = Studio::new(state, painter(&choice, look), files, desk, send);
+    state.work = Some(("load", 0, 0));
+    let mut studio = Studio::new(state, painter(&choice, look), files, desk, send, cancel);
     let ended = studio.run(&receive, task);
     studio.cancel.cancel();
     studio.hands.cancel();
@@ -156,7 +160,6 @@ struct Studio {
     mailbox: Arc<Mailbox>,
     thumbs: Arc<Newest>,
     files: Arc<dyn Files>,
-    desk: Arc<dyn Desk>,
     hands: Workers,
     events: Sender<Event>,
     /// Ends the work in the background.
@@ -203,12 +206,12 @@ impl Studio {
         state: State,
         painter: Box<dyn Painter>,
         files: Arc<dyn Files>,
-        desk: Arc<dyn Desk>,
+        desk: &Arc<dyn Desk>,
         events: Sender<Event>,
+        cancel: Task,
     ) -> Self {
-        let cancel = Task::default();
         let progress = Task::observed(Arc::new(Progress::new(events.clone())));
-        let hands = Workers::start(Arc::clone(&desk), &events, progress, &cancel);
+        let hands = Workers::start(Arc::clone(desk), &events, progress, &cancel);
         Studio {
             shown: Buffer::empty(Rect::ZERO),
             stale: true,
@@ -217,7 +220,6 @@ impl Studio {
             mailbox: Arc::default(),
             thumbs: Arc::default(),
             files,
-            desk,
             hands,
             events,
             cancel,
@@ -229,7 +231,6 @@ impl Studio {
     fn run(&mut self, receive: &Receiver<Event>, task: &Task) -> Result<()> {
         start_painter(Arc::clone(&self.mailbox), self.events.clone());
         start_thumbs(Arc::clone(&self.thumbs), self.events.clone());
-        self.start_opening();
         self.listen(task);
         self.draw()?;
         loop {
@@ -374,20 +375,6 @@ impl Studio {
         });
     }
 
-    /// Reads and fits in the background.
-    fn start_opening(&mut self) {
-        let (files, events) = (Arc::clone(&self.files), self.events.clone());
-        let (desk, cancel) = (Arc::clone(&self.desk), self.cancel.clone());
-        self.state.work = Some(("load", 0, 0));
-        start("opening", move || {
-            let progress = Arc::new(Progress::new(events.clone()));
-            let task = Task::observed(progress).with_flag(cancel.flag());
-            if let Err(error) = open(&*files, &*desk, &events, &task) {
-                let _ = events.send(Event::Answer(Answer::Failed(error)));
-            }
-        });
-    }
-
     fn save_picture(&self, name: String, wish: Wish) {
         let (files, events) = (Arc::clone(&self.files), self.events.clone());
         start("picture", move || {
@@ -415,6 +402,24 @@ impl Studio {
             let _ = events.send(Event::Answer(answer));
         });
     }
+}
+
+/// Reads and fits in the background.
+fn start_opening(
+    files: &Arc<dyn Files>,
+    desk: &Arc<dyn Desk>,
+    events: &Sender<Event>,
+    cancel: &Task,
+) {
+    let (files, events) = (Arc::clone(files), events.clone());
+    let (desk, cancel) = (Arc::clone(desk), cancel.clone());
+    start("opening", move || {
+        let progress = Arc::new(Progress::new(events.clone()));
+        let task = Task::observed(progress).with_flag(cancel.flag());
+        if let Err(error) = open(&*files, &*desk, &events, &task) {
+            let _ = events.send(Event::Answer(Answer::Failed(error)));
+        }
+    });
 }
 
 /// The frames between two times, if there are any.

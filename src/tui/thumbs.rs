@@ -28,6 +28,8 @@ const CALM: Duration = Duration::from_millis(30);
 const LONGEST: Duration = Duration::from_millis(120);
 /// What is ready is shown this often.
 const BATCH: Duration = Duration::from_millis(250);
+/// A shape so many times as large as those along the curve has burst.
+const LARGEST: f64 = 1.5;
 /// Places along the curve whose shapes say how large a mesh is.
 const SIZES: usize = 9;
 
@@ -220,6 +222,10 @@ impl Bench {
         }
         let loom = &wish.scene.of.0;
         let positions = loom.pose_at(square.middle).ok()?;
+        // Far from the motion g is a guess: shapes that burst are left out.
+        if diagonal(Bounds::of(&positions)?) > LARGEST * diagonal(self.bounds?) {
+            return None;
+        }
         let pixels = (wish.side.1 * square.side / wish.side.0).round().max(1.0) as usize;
         let mut camera = Camera::framing(&self.bounds?, 1.0);
         (camera.yaw, camera.pitch) = (wish.view.yaw, wish.view.pitch);

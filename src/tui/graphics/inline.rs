@@ -6,6 +6,7 @@ use std::collections::HashMap;
 
 use ratatui::buffer::{Buffer, CellDiffOption};
 use ratatui::layout::Rect;
+use ratatui::style::Color;
 
 use super::{Aside, CellSize, Painter};
 use crate::image::Image;
@@ -29,6 +30,8 @@ pub(super) trait Encoder {
 pub(super) struct Inline<E> {
     encoder: E,
     cell: CellSize,
+    /// Behind text that has no background of its own: the pictures'.
+    ground: Color,
     shown: HashMap<usize, Shown>,
     painted: Vec<(usize, Image, Rect)>,
 }
@@ -41,10 +44,11 @@ struct Shown {
 }
 
 impl<E: Encoder> Inline<E> {
-    pub(super) fn new(encoder: E, cell: CellSize) -> Self {
+    pub(super) fn new(encoder: E, cell: CellSize, ground: Color) -> Self {
         Inline {
             encoder,
             cell,
+            ground,
             shown: HashMap::new(),
             painted: Vec::new(),
         }
@@ -135,7 +139,7 @@ impl<E: Encoder> Painter for Inline<E> {
     fn finish(&mut self, buffer: &mut Buffer, aside: &mut Aside) {
         let mut now = HashMap::new();
         for (slot, image, area) in std::mem::take(&mut self.painted) {
-            let covered = covered(area, buffer);
+            let covered = covered(area, self.ground, buffer);
             let shown = Shown {
                 image,
                 area,
@@ -153,7 +157,7 @@ impl<E: Encoder> Painter for Inline<E> {
 }
 
 /// Which cells of `area` hold text by now; the others are not to be sent.
-fn covered(area: Rect, buffer: &mut Buffer) -> Vec<bool> {
+fn covered(area: Rect, ground: Color, buffer: &mut Buffer) -> Vec<bool> {
     area.positions()
         .map(|at| {
             let Some(cell) = buffer.cell_mut(at) else {
@@ -162,6 +166,8 @@ fn covered(area: Rect, buffer: &mut Buffer) -> Vec<bool> {
             let picture = cell.symbol() == PICTURE;
             if picture {
                 cell.set_diff_option(CellDiffOption::Skip);
+            } else if cell.bg == Color::Reset {
+                cell.set_bg(ground);
             }
             !picture
         })
@@ -273,7 +279,7 @@ mod tests {
 
     #[test]
     fn only_what_changed_is_sent_and_text_keeps_its_cells() {
-        let mut painter = Inline::new(Plain(true), CELL);
+        let mut painter = Inline::new(Plain(true), CELL, Color::Reset);
         let mut last = Buffer::empty(Rect::new(0, 0, 8, 4));
         let first = frame(&mut painter, &mut last, [1, 2, 3, 4, 5, 6], &[]);
         assert_eq!(first, ("\x1b[2;3H<3x2>123456".into(), vec![]));
@@ -289,7 +295,7 @@ mod tests {
 
     #[test]
     fn text_under_an_opaque_picture_is_sent_again() {
-        let mut painter = Inline::new(Plain(false), CELL);
+        let mut painter = Inline::new(Plain(false), CELL, Color::Reset);
         let mut last = Buffer::empty(Rect::new(0, 0, 8, 4));
         frame(&mut painter, &mut last, [1; 6], &[(3, 1)]);
         let (sent, cells) = frame(&mut painter, &mut last, [2; 6], &[(3, 1)]);
@@ -299,7 +305,7 @@ mod tests {
 
     #[test]
     fn where_a_picture_leaves_spaces_are_sent() {
-        let mut painter = Inline::new(Plain(true), CELL);
+        let mut painter = Inline::new(Plain(true), CELL, Color::Reset);
         let mut last = Buffer::empty(Rect::new(0, 0, 8, 4));
         frame(&mut painter, &mut last, [1; 6], &[]);
         let empty = Buffer::empty(Rect::new(0, 0, 8, 4));

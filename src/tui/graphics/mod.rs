@@ -90,7 +90,8 @@ impl CellSize {
         let (width, height, fine) = match protocol {
             // Common cells; the terminal scales what it shows.
             Protocol::Kitty | Protocol::Iterm2 | Protocol::Sixel => (8, 16, 1),
-            Protocol::Blocks | Protocol::Braille | Protocol::Ascii => (2, 4, 2),
+            Protocol::Blocks | Protocol::Braille => (2, 4, 2),
+            Protocol::Ascii => (2, 4, 1),
         };
         CellSize {
             width,
@@ -125,10 +126,16 @@ pub(super) trait Painter {
 /// The painter of a choice.
 pub(super) fn painter(choice: &Choice, look: Look) -> Box<dyn Painter> {
     let registers = choice.registers;
+    let [red, green, blue, _] = look.plot(0.0).background.0;
+    let ground = look.colour([red, green, blue]);
     match choice.protocol {
         Protocol::Kitty => Box::new(kitty::Kitty::new(choice.tmux)),
-        Protocol::Iterm2 => Box::new(inline::Inline::new(iterm2::Iterm2, choice.cell)),
-        Protocol::Sixel => Box::new(inline::Inline::new(sixel::Sixel { registers }, choice.cell)),
+        Protocol::Iterm2 => Box::new(inline::Inline::new(iterm2::Iterm2, choice.cell, ground)),
+        Protocol::Sixel => Box::new(inline::Inline::new(
+            sixel::Sixel { registers },
+            choice.cell,
+            ground,
+        )),
         Protocol::Blocks => Box::new(blocks::Blocks(look)),
         Protocol::Braille => Box::new(dots::Braille(look)),
         Protocol::Ascii => Box::new(dots::Ascii(look)),

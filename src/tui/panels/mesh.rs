@@ -61,8 +61,13 @@ impl Panel for Mesh {
 }
 
 impl Mesh {
-    /// The loom as it was first there, at the same time or place.
+    /// The capture's frame at that time of it, or the loom as it was first there.
     fn before(&self, state: &State) -> Option<Pose> {
+        if let (None, Some(capture), Some(loom)) = (state.roaming, &state.capture, state.loom()) {
+            let (source, _) = loom.time().source_time(state.playback.t)?;
+            let frame = (source.round().max(1.0) as usize - 1).min(capture.of.0.frames() - 1);
+            return Some(Pose::Frame(capture.clone(), frame));
+        }
         let scene = state.fitted.clone()?;
         let last = scene.of.0.frames() as f64;
         Some(match state.roaming {

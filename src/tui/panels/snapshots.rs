@@ -8,19 +8,13 @@ use crate::mesh::{Bounds, Sequence, Topology};
 use crate::pipeline::plot::plot_loom;
 use crate::task::Task;
 use crate::tui::event::{Answer, Event};
-use crate::tui::graphics::Protocol;
+use crate::tui::graphics::{CellSize, Protocol};
 use crate::tui::state::{Content, Same, Scene, Signals, State};
-use crate::tui::theme::{Depth, Look};
 
 /// Frames of the bar's swing.
 const FRAMES: usize = 16;
 /// Rings of the bar.
 const RINGS: usize = 12;
-
-const LOOK: Look = Look {
-    dark: true,
-    depth: Depth::Mono,
-};
 
 /// A square bar that bends from side to side and back a little higher.
 fn bar(frames: usize) -> Sequence {
@@ -53,10 +47,15 @@ fn bar(frames: usize) -> Sequence {
     Sequence::new(topology.into(), positions, Some(24.0))
 }
 
-/// The studio with the bar open: its frames, then the loom.
+/// The studio in letters with the bar open.
 fn studio(size: (u16, u16), frames: usize) -> State {
-    let mut state = studio_of("bar", size, LOOK);
-    state.plain_letters = true;
+    studio_by(Protocol::Ascii, size, frames)
+}
+
+/// The studio with the bar open: its frames, then the loom.
+fn studio_by(protocol: Protocol, size: (u16, u16), frames: usize) -> State {
+    let mut state = studio_of("bar", size, CellSize::of(protocol));
+    state.plain_letters = protocol == Protocol::Ascii;
     let capture = bar(frames);
     let bounds = Bounds::of_frames(&capture).unwrap().unwrap();
     let options = FitOptions {
@@ -116,8 +115,7 @@ fn a_large_screen_has_words_too() {
 
 #[test]
 fn without_colours_there_is_braille() {
-    let mut state = studio((120, 36), FRAMES);
-    state.plain_letters = false;
+    let mut state = studio_by(Protocol::Braille, (120, 36), FRAMES);
     keys(&mut state, "w");
     insta::assert_snapshot!("braille_120x36", screen(&state, Protocol::Braille));
 }

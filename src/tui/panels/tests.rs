@@ -33,13 +33,13 @@ const CELL: CellSize = CellSize {
 };
 
 /// A studio with nothing open yet.
-pub(super) fn studio_of(name: &str, size: (u16, u16), look: Look) -> State {
-    State::new(name.into(), size, CELL, look)
+pub(super) fn studio_of(name: &str, size: (u16, u16), cell: CellSize) -> State {
+    State::new(name.into(), size, cell, LOOK)
 }
 
 /// A studio with a loom open on a screen of that size, all of its pictures drawn.
 fn studio(size: (u16, u16)) -> State {
-    let mut state = studio_of("ring", size, LOOK);
+    let mut state = studio_of("ring", size, CELL);
     let loom = ring(20, 15, false);
     let bounds = Bounds::of(&loom.at(1.0).unwrap()).unwrap();
     let (map, times) = plot_loom(&loom);
