@@ -56,7 +56,7 @@ impl Fitting {
 }
 
 /// How much of the last step is gone once more before triangles are laid on: steps of this kind shrink
-/// slowly in one direction, and with it four do what six do without.
+/// slowly in one direction, and with it six do what ten do without.
 const MOMENTUM: f64 = 0.7;
 
 /// Writes to `ahead` where `now` goes on to, coming from `before`.

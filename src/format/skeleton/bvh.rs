@@ -46,6 +46,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<SkeletonPoses> {
     }
     let mut positions = Vec::new();
     let channels: usize = tree.channels.iter().map(Vec::len).sum();
+    if channels == 0 && frames > 1.0 {
+        return words.told(format!("{frames} frames without a channel that moves"));
+    }
     let mut values = vec![0.0; channels];
     for _ in 0..frames as usize {
         for value in &mut values {
@@ -482,6 +485,8 @@ mod tests {
                 .message
                 .contains("`Wrotation`")
         );
+        let still = "HIERARCHY ROOT a { OFFSET 0 0 0 } MOTION Frames: 1e15 Frame Time: 1";
+        assert!(told(still).message.contains("without a channel"));
         assert!(read(&[0xff, 0xfe]).is_err());
     }
 }
