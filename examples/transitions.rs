@@ -153,6 +153,7 @@ struct Measured {
     floor: f64,
     worst: f64,
     crossings: usize,
+    strange: usize,
     near: f64,
     turns: f64,
     gradient: f64,
@@ -197,7 +198,11 @@ impl Measured {
                 .iter()
                 .map(|one| one.deviation)
                 .fold(0.0, f64::max),
-            crossings: crossings(&curve),
+            crossings: crossings(&curve).len(),
+            strange: crossings(&curve)
+                .into_iter()
+                .filter(|&times| !recurs(&fitted, &spline, times))
+                .count(),
             near: nearness(&fitted),
             turns: turns(&curve),
             gradient: gradient(&fitted),
@@ -238,6 +243,10 @@ impl Measured {
         figure.goal(
             &format!("{name}: no deviation above 0.06 of a frame step"),
             self.worst <= 0.06,
+        );
+        figure.goal(
+            &format!("{name}: no crossing that is not a recurrence"),
+            self.strange == 0,
         );
     }
 }
@@ -280,17 +289,31 @@ fn minus(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0] - b[0], a[1] - b[1]]
 }
 
-/// How often the curve crosses itself.
-fn crossings(curve: &[[f64; 2]]) -> usize {
+/// Whether the motion passes nearly the same shape at two times: nearer than a frame step, or than a
+/// fifth of what frames are apart in root mean square.
+fn recurs(fitted: &Fitted, spline: &dyn Fn(f64) -> Vec<f64>, [t, u]: [f64; 2]) -> bool {
+    let distances = fitted.subspace.distances();
+    let squares: f64 = distances.values().iter().map(|d| d * d).sum();
+    let usual = (squares / distances.values().len() as f64).sqrt();
+    let steps = (1..fitted.subspace.frames).map(|i| distances.get(i - 1, i));
+    let step = steps.fold(0.0, f64::max);
+    let pairs = spline(t).into_iter().zip(spline(u));
+    let apart = pairs.map(|(x, y)| (x - y) * (x - y)).sum::<f64>().sqrt();
+    apart < step.max(0.2 * usual)
+}
+
+/// The times at which the curve crosses itself.
+fn crossings(curve: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let meet = |i: usize, j: usize| {
         let (a, b, c, d) = (curve[i], curve[i + 1], curve[j], curve[j + 1]);
         let apart = |p, q, r, s| cross(minus(q, p), minus(r, p)) * cross(minus(q, p), minus(s, p));
         apart(a, b, c, d) < 0.0 && apart(c, d, a, b) < 0.0
     };
     let last = curve.len() - 1;
-    (0..last)
-        .map(|i| (i + 2..last).filter(|&j| meet(i, j)).count())
-        .sum()
+    let time = |i: usize| 1.0 + (i as f64 + 0.5) / 8.0;
+    let pairs = (0..last).flat_map(|i| (i + 2..last).map(move |j| (i, j)));
+    let pairs = pairs.filter(|&(i, j)| meet(i, j));
+    pairs.map(|(i, j)| [time(i), time(j)]).collect()
 }
 
 /// Full turns of the curve's direction, to either side.

@@ -39,7 +39,7 @@ pub use layout::Choice;
 const CLEARLY: f64 = 0.8;
 
 /// So many rounds more are spent on a fit that is not yet right.
-const AGAIN: usize = 2;
+const AGAIN: usize = 4;
 
 /// Fidelity of an ordered fit.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -13,7 +13,7 @@ const SHORT: usize = 64;
 const DENSE_LAYOUT: usize = 120;
 
 /// What a frame counts, for 1 of a sample between frames.
-const KNOWN: f64 = 2.0;
+const KNOWN: f64 = 2.25;
 /// The density of sites is this power of how much the motion bends, ..
 const BENT: f64 = 0.35;
 /// .. which counts at least so much of its mean everywhere.
