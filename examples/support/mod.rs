@@ -6,6 +6,8 @@
 //! ```
 #![allow(dead_code)] // every figure uses its part
 
+pub(crate) mod rojas;
+
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;

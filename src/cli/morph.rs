@@ -8,13 +8,14 @@ use super::args::Part;
 use super::report;
 use super::session::{Outcome, Session};
 use crate::diag::Result;
-use crate::pipeline::{self, MorphMethod, MorphReport, MorphRequest, Output, Saved};
+use crate::pipeline::{self, MorphMethod, MorphPath, MorphReport, MorphRequest, Output, Saved};
 
 /// Write the frames between poses of a mesh or a skeleton
 ///
 /// Poses follow each other in the order given; the frames at them are the poses themselves. isometric:
 /// edge lengths go linearly from one pose to the next and triangles turn as their neighbours do; exact
-/// for meshes without inner vertices. Of skeletons (.bvh, and .json lists of joints) bones go linearly
+/// for meshes without inner vertices. edge-lengths: edge lengths go linearly and are met, as near as a
+/// shape can; --path leads through the space of three, four or more poses. Of skeletons (.bvh, and .json lists of joints) bones go linearly
 /// in length and straight in direction.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
@@ -30,8 +31,8 @@ pub(super) struct Args {
     #[arg(long, short, value_name = "OUT")]
     output: PathBuf,
 
-    /// How shapes between the poses are found: isometric, or spline (one curve through all poses in a
-    /// shape space)
+    /// How shapes between the poses are found: isometric, spline (one curve through all poses in a shape
+    /// space), edge-lengths
     #[arg(long, value_name = "METHOD", default_value = MorphMethod::default().name())]
     method: MorphMethod,
 
@@ -43,6 +44,20 @@ pub(super) struct Args {
     /// next]
     #[arg(long, value_name = "N")]
     frames: Option<usize>,
+
+    /// Where the frames lie among the poses: `circle` between four poses at the corners of a square, or a
+    /// smooth curve through points: `0,0 0.5,1 1,1` in that square, else one weight a pose
+    /// [edge-lengths]
+    #[arg(long, value_name = "PATH")]
+    path: Option<MorphPath>,
+
+    /// Blend the squares of lengths: right for shapes stretched in one direction [edge-lengths]
+    #[arg(long)]
+    squared: bool,
+
+    /// Embed every Nth frame only, blend lengths and angles between [edge-lengths]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    every: Option<u32>,
 
     /// Say which files would be written and removed, and end
     #[arg(long)]
@@ -96,6 +111,9 @@ impl Args {
             method: self.method,
             frames: self.frames,
             space: self.space.clone(),
+            path: self.path.clone(),
+            squared: self.squared,
+            every: self.every.map(|every| every as usize),
         }
     }
 }
@@ -154,6 +172,25 @@ fn told(session: &Session, found: &MorphReport) -> String {
                 "{} on average, {} without that",
                 report::percent(alignment.with.edge_mean_percent),
                 report::percent(alignment.without.edge_mean_percent),
+            ),
+        ));
+    }
+    if let Some(embedding) = &found.embedding {
+        let [half, _, most, _] = embedding.percentiles;
+        rows.push((
+            "edges within 1 %",
+            format!(
+                "{} in the worst frame (half within {}, 98 % within {})",
+                report::percent(embedding.within_percent),
+                report::percent(half),
+                report::percent(most)
+            ),
+        ));
+        rows.push((
+            "closed walks",
+            format!(
+                "{}, residual at most {:.2e} (frame {})",
+                embedding.walks, embedding.residual, embedding.residual_frame
             ),
         ));
     }

@@ -2,6 +2,7 @@
 
 pub mod b_spline;
 pub mod banded;
+pub mod block_sparse;
 pub mod cubic_spline;
 pub mod curve_join;
 pub mod direction;

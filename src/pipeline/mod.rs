@@ -38,9 +38,10 @@ pub use key_path::{KeyPath, key_map, key_path, plot_motion};
 pub use loom::{check_loom_output, is_loom, open_loom, save_loom};
 pub use memory::{Made, Memory, Remembered};
 pub use morph::{
-    AlignmentEffect, AlignmentReport, EdgeReport, Morph, MorphMethod, MorphReport, MorphRequest,
-    SkeletonMorphed, Strain, is_skeleton, morph, morph_frames, morph_skeletons, open_skeletons,
-    plan_skeletons, save_skeletons,
+    AlignmentEffect, AlignmentReport, EdgeReport, EmbeddingReport, ImpossibleVertex, JumpReport,
+    MissedEdge, Morph, MorphMethod, MorphPath, MorphReport, MorphRequest, SkeletonMorphed, Strain,
+    is_skeleton, morph, morph_frames, morph_skeletons, open_skeletons, plan_skeletons,
+    save_skeletons,
 };
 pub use open::{Capture, Content, Origin, open};
 pub use output::{Output, Plan, plan};

@@ -1,8 +1,10 @@
 //! Morphs: poses of one mesh to the frames between them, by any of the methods. To add a method: a file
 //! beside this one and a line in [`MorphMethod`].
 
+mod edge_lengths;
 mod edges;
 mod isometric;
+mod path;
 mod skeleton;
 mod spline;
 
@@ -15,7 +17,9 @@ use crate::diag::{Diagnostic, Result, Warned};
 use crate::mesh::{FrameSource, Sequence};
 use crate::task::Task;
 
+pub use edge_lengths::{EmbeddingReport, ImpossibleVertex, JumpReport, MissedEdge};
 pub use edges::{EdgeReport, Strain};
+pub use path::MorphPath;
 pub use skeleton::{
     SkeletonMorphed, is_skeleton, morph_skeletons, open_skeletons, plan_skeletons, save_skeletons,
 };
@@ -28,17 +32,24 @@ pub enum MorphMethod {
     Isometric,
     /// One cubic spline through all poses in a shape space: see [`crate::inbetween::complete()`].
     Spline,
+    /// Lengths linear and met exactly where a shape has them: see [`crate::inbetween::edge_lengths`].
+    EdgeLengths,
 }
 
 impl MorphMethod {
     /// All of them.
-    pub const ALL: &[MorphMethod] = &[MorphMethod::Isometric, MorphMethod::Spline];
+    pub const ALL: &[MorphMethod] = &[
+        MorphMethod::Isometric,
+        MorphMethod::Spline,
+        MorphMethod::EdgeLengths,
+    ];
 
     /// Its name on the command line and in recipes.
     pub fn name(self) -> &'static str {
         match self {
             MorphMethod::Isometric => "isometric",
             MorphMethod::Spline => "spline",
+            MorphMethod::EdgeLengths => "edge-lengths",
         }
     }
 }
@@ -65,6 +76,13 @@ pub struct MorphRequest {
     pub frames: Option<usize>,
     /// The shape space's name; for the method `spline`, patch-lri if not given.
     pub space: Option<String>,
+    /// Where the frames lie among the poses; if not given, from each pose to the next. For the method
+    /// `edge-lengths`, as the two below.
+    pub path: Option<MorphPath>,
+    /// Squares of lengths are blended instead of lengths.
+    pub squared: bool,
+    /// Every so many frames one is embedded, lengths and angles are blended between; all if not given.
+    pub every: Option<usize>,
 }
 
 /// Frames from one pose to the next where their number is not given: a second of film.
@@ -93,6 +111,9 @@ pub struct MorphReport {
     /// What taking off the rigid motion changes; for the method `isometric`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub alignment: Option<AlignmentReport>,
+    /// How lengths were embedded; for the method `edge-lengths`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub embedding: Option<EmbeddingReport>,
 }
 
 /// What taking off the rigid motion between two poses before they are compared changes half way between
@@ -162,10 +183,16 @@ pub fn morph(poses: &Sequence, request: &MorphRequest, task: &Task) -> Result<Wa
     let mut morph = match request.method {
         MorphMethod::Isometric => {
             no_space(request)?;
+            only_edge_lengths(request)?;
             isometric::morph(poses, &moments, task)?.measured(poses, &moments, request.method)
         }
         MorphMethod::Spline => {
+            only_edge_lengths(request)?;
             spline::morph(poses, &moments, request, task)?.measured(poses, &moments, request.method)
+        }
+        MorphMethod::EdgeLengths => {
+            no_space(request)?;
+            edge_lengths::morph(poses, request, task)?
         }
     };
     morph
@@ -198,6 +225,7 @@ impl Warned<Found> {
             edges,
             strain,
             alignment,
+            embedding: None,
         };
         Warned {
             output: Morph { frames, report },
@@ -215,6 +243,23 @@ fn no_space(request: &MorphRequest) -> Result<()> {
             request.method.name()
         ))
         .hint("leave the space out, or take the method spline")
+        .err(),
+    }
+}
+
+/// Refuses options that other methods do not know.
+fn only_edge_lengths(request: &MorphRequest) -> Result<()> {
+    let given = [
+        ("path", request.path.is_some()),
+        ("squared", request.squared),
+        ("every", request.every.is_some()),
+    ];
+    match given.iter().find(|(_, given)| *given) {
+        None => Ok(()),
+        Some((name, _)) => Diagnostic::error(format!(
+            "`{name}` is for the method edge-lengths, not for {}",
+            request.method.name()
+        ))
         .err(),
     }
 }

@@ -143,6 +143,7 @@ pub fn morph_skeletons(
                 edges: EdgeReport::of(&errors),
                 strain,
                 alignment: None,
+                embedding: None,
             },
         },
         warnings,

@@ -1,0 +1,263 @@
+//! `morph --method edge-lengths` through the real binary: what it keeps, what it says, what it refuses.
+
+mod support;
+
+use std::fmt::Write;
+use std::fs;
+use std::path::Path;
+
+use support::meshloom;
+use tempfile::tempdir;
+
+/// Writes a mesh as OBJ, triangles counted from 0.
+fn write(path: &Path, points: &[[f64; 3]], triangles: &[[usize; 3]]) {
+    let mut text = String::new();
+    for [x, y, z] in points {
+        writeln!(text, "v {x} {y} {z}").unwrap();
+    }
+    for t in triangles {
+        writeln!(text, "f {} {} {}", t[0] + 1, t[1] + 1, t[2] + 1).unwrap();
+    }
+    fs::write(path, text).unwrap();
+}
+
+/// A closed tube along x of n rings of 8, capped, bent by `turn` radians and `wide` in its section.
+fn tube(n: usize, turn: f64, wide: f64) -> (Vec<[f64; 3]>, Vec<[usize; 3]>) {
+    let bent = |x: f64, y: f64, z: f64| match turn == 0.0 {
+        true => [x, y, z],
+        false => {
+            let radius = 4.0 / turn;
+            let (sine, cosine) = (x / radius).sin_cos();
+            [(radius - y) * sine, radius - (radius - y) * cosine, z]
+        }
+    };
+    let mut points = Vec::new();
+    for i in 0..n {
+        let x = 4.0 * i as f64 / (n - 1) as f64 - 2.0;
+        for j in 0..8 {
+            let angle = std::f64::consts::TAU * j as f64 / 8.0;
+            points.push(bent(x, 0.4 * wide * angle.cos(), 0.4 * angle.sin()));
+        }
+    }
+    points.extend([bent(-2.2, 0.0, 0.0), bent(2.2, 0.0, 0.0)]);
+    let at = |i: usize, j: usize| 8 * i + j % 8;
+    let mut triangles = Vec::new();
+    for j in 0..8 {
+        for i in 0..n - 1 {
+            triangles.push([at(i, j), at(i, j + 1), at(i + 1, j + 1)]);
+            triangles.push([at(i, j), at(i + 1, j + 1), at(i + 1, j)]);
+        }
+        triangles.push([8 * n, at(0, j + 1), at(0, j)]);
+        triangles.push([8 * n + 1, at(n - 1, j), at(n - 1, j + 1)]);
+    }
+    (points, triangles)
+}
+
+/// Poses a.obj, b.obj, c.obj, d.obj of a tube in a folder: two turns, two widths.
+fn four(folder: &Path) {
+    for (name, turn, wide) in [
+        ("a", 0.0, 1.0),
+        ("b", 1.5, 1.0),
+        ("c", 0.0, 1.1),
+        ("d", 1.5, 1.1),
+    ] {
+        let (points, triangles) = tube(14, turn, wide);
+        write(&folder.join(format!("{name}.obj")), &points, &triangles);
+    }
+}
+
+#[test]
+fn a_bent_tube_keeps_its_lengths_and_its_poses() {
+    let folder = tempdir().unwrap();
+    four(folder.path());
+    let args = "morph a.obj b.obj -o out --method edge-lengths --frames 9 --json";
+    let object = meshloom(folder.path(), args).done().object();
+    let report = &object["report"];
+    assert_eq!(report["method"], "edge-lengths");
+    // positions are written with 32-bit floats
+    assert!(
+        report["edges"]["worst_percent"].as_f64().unwrap() < 1e-2,
+        "{report}"
+    );
+    let embedding = &report["embedding"];
+    assert_eq!(embedding["walks"], 14 * 8 + 2);
+    assert_eq!(embedding["embedded"], 9);
+    assert!(embedding["residual"].as_f64().unwrap() < 1e-6, "{report}");
+    assert_eq!(embedding["within_percent"], 100.0);
+    for (frame, pose) in [(1, "a"), (9, "b")] {
+        let args = format!("compare {pose}.obj out/frame_000{frame}.obj --json");
+        assert_eq!(meshloom(folder.path(), &args).done().object()["max"], 0.0);
+    }
+}
+
+#[test]
+fn frames_between_embedded_ones_have_lengths_and_angles_blended() {
+    let folder = tempdir().unwrap();
+    four(folder.path());
+    let args = "morph a.obj b.obj -o out --method edge-lengths --frames 13 --every 6 --json";
+    let report = &meshloom(folder.path(), args).done().object()["report"];
+    assert_eq!(report["embedding"]["embedded"], 3);
+    // R14 fills so as well: lengths and angles of near shapes nearly fit each other
+    assert!(
+        report["edges"]["worst_percent"].as_f64().unwrap() < 2.0,
+        "{report}"
+    );
+}
+
+#[test]
+fn paths_lead_through_the_space_of_several_poses() {
+    let folder = tempdir().unwrap();
+    four(folder.path());
+    let run = |args: &str| {
+        let args = format!("morph {args} --method edge-lengths --json");
+        meshloom(folder.path(), &args).done().object()
+    };
+    let circle = run("a.obj b.obj c.obj d.obj -o circle --path circle --frames 9");
+    assert_eq!(circle["frames"], 9);
+    assert!(circle["report"]["edges"]["worst_percent"].as_f64().unwrap() < 1.0);
+    // around the circle once: the last frame is the first
+    let args = "compare circle/frame_0001.obj circle/frame_0009.obj --json";
+    let closed = meshloom(folder.path(), args).done().object();
+    assert!(closed["edge_max_percent"].as_f64().unwrap() < 0.1);
+    run("a.obj b.obj c.obj -o three --path 1,0,0;1,1,1;0,0,1 --frames 5 --squared");
+    let args = "compare three/frame_0005.obj c.obj --json";
+    assert!(
+        meshloom(folder.path(), args).done().object()["max"]
+            .as_f64()
+            .unwrap()
+            < 1e-5
+    );
+}
+
+#[test]
+fn what_a_path_or_a_mesh_cannot_do_is_told() {
+    let folder = tempdir().unwrap();
+    four(folder.path());
+    let refused = |args: &str, parts: &[&str]| {
+        let args = format!("morph {args} -o out");
+        meshloom(folder.path(), &args).fails_with(parts);
+    };
+    refused("a.obj b.obj --path 1,0;0,1", &["path", "edge-lengths"]);
+    refused("a.obj b.obj --squared", &["squared", "edge-lengths"]);
+    refused(
+        "a.obj b.obj --method edge-lengths --path circle",
+        &["needs four poses"],
+    );
+    let usage = meshloom(folder.path(), "morph a.obj b.obj -o out --path 1,x;0,1");
+    assert_eq!(usage.code, Some(2));
+    assert!(
+        usage.stderr.contains("`x` is no number"),
+        "{}",
+        usage.stderr
+    );
+    // far outside of the poses lengths turn negative: the triangle is named
+    refused(
+        "a.obj d.obj --method edge-lengths --path 1,0;-30,31",
+        &["triangle", "cannot have sides", "vertices"],
+    );
+    assert!(!folder.path().join("out").exists());
+}
+
+#[test]
+fn meshes_without_inner_vertices_and_stretched_poses_are_warned_about() {
+    let folder = tempdir().unwrap();
+    let strip = |angle: f64, size: f64| -> Vec<[f64; 3]> {
+        let (sine, cosine) = f64::sin_cos(angle);
+        vec![
+            [0.0, 0.0, 0.0],
+            [2.0 * size, 0.0, 0.0],
+            [1.0, cosine, sine],
+            [1.0, -cosine, sine],
+        ]
+    };
+    let triangles = [[0, 1, 2], [1, 0, 3]];
+    write(&folder.path().join("a.obj"), &strip(0.1, 1.0), &triangles);
+    write(&folder.path().join("b.obj"), &strip(0.7, 1.6), &triangles);
+    let args = "morph a.obj b.obj -o out --method edge-lengths --frames 3 --json";
+    let object = meshloom(folder.path(), args).done().object();
+    let told = object["warnings"].to_string();
+    assert!(told.contains("no inner vertex"), "{told}");
+    assert!(told.contains("not near-isometric"), "{told}");
+    assert_eq!(object["report"]["embedding"]["walks"], 0);
+    assert!(object["report"]["edges"]["worst_percent"].as_f64().unwrap() < 1e-3);
+}
+
+#[test]
+fn corner_angles_that_cannot_close_and_flat_triangles_are_told_at_their_vertex() {
+    let folder = tempdir().unwrap();
+    // a pyramid over a square that turns inside out between the poses: half way its sides are too short
+    let pyramid = |top: [f64; 3], wide: f64| {
+        let mut points: Vec<[f64; 3]> = [[1., 1.], [-1., 1.], [-1., -1.], [1., -1.]]
+            .map(|[x, y]| [x * wide, y, 0.0])
+            .to_vec();
+        points.extend([top, [0.0, 0.0, -1.5]]);
+        points
+    };
+    let triangles = [
+        [0, 1, 4],
+        [1, 2, 4],
+        [2, 3, 4],
+        [3, 0, 4],
+        [1, 0, 5],
+        [2, 1, 5],
+        [3, 2, 5],
+        [0, 3, 5],
+    ];
+    write(
+        &folder.path().join("a.obj"),
+        &pyramid([0.9, 0.9, 0.02], 1.0),
+        &triangles,
+    );
+    write(
+        &folder.path().join("b.obj"),
+        &pyramid([-0.9, -0.9, 0.02], 1.0),
+        &triangles,
+    );
+    let args = "morph a.obj b.obj -o out --method edge-lengths --frames 5 --json";
+    let object = meshloom(folder.path(), args).done().object();
+    let impossible = object["report"]["embedding"]["impossible"]
+        .as_array()
+        .unwrap();
+    if let Some(worst) = impossible.first() {
+        let told = object["warnings"].to_string();
+        assert!(told.contains("cannot close"), "{told}");
+        assert!(worst["degrees"].as_f64().unwrap() > 0.0);
+    }
+    // a triangle of three points in a row in both poses is carried along
+    let flat = |turn: f64| {
+        let (mut points, triangles) = tube(5, turn, 1.0);
+        let [a, b] = [points[8], points[16]];
+        points.push(std::array::from_fn(|i| 0.5 * (a[i] + b[i])));
+        let mut triangles = triangles;
+        triangles.push([8, 16, points.len() - 1]);
+        (points, triangles)
+    };
+    for (name, turn) in [("c", 0.0), ("d", 0.8)] {
+        let (points, triangles) = flat(turn);
+        write(
+            &folder.path().join(format!("{name}.obj")),
+            &points,
+            &triangles,
+        );
+    }
+    let args = "morph c.obj d.obj -o flat --method edge-lengths --frames 4 --json";
+    let report = &meshloom(folder.path(), args).done().object()["report"];
+    assert!(
+        report["edges"]["worst_percent"].as_f64().unwrap() < 0.5,
+        "{report}"
+    );
+}
+
+#[test]
+fn the_same_bytes_on_any_number_of_threads() {
+    let folder = tempdir().unwrap();
+    four(folder.path());
+    let written = |threads: usize| {
+        let args = format!(
+            "morph a.obj d.obj -o {threads}.pc2 --method edge-lengths --frames 5 --every 2 --threads {threads}"
+        );
+        meshloom(folder.path(), &args).done();
+        fs::read(folder.path().join(format!("{threads}.pc2"))).unwrap()
+    };
+    assert_eq!(written(1), written(2));
+}
