@@ -169,16 +169,22 @@ fn horse_gallop() -> Option<String> {
 /// From a cancellation in the middle of native work to its end, in this process, as a reload waits for it;
 /// and from Ctrl-C to the end of the program.
 fn interruptions() {
-    let jelly = "let a = fit(demo(\"jelly\"), #{ tolerance: 0.02, space: \"gradients\" });\n";
-    let sample = "fit(demo(\"bar\"), #{ tolerance: 0.02 }).resample(frames(200000))";
-    let pairs =
-        "let j = demo(\"jelly\"); let s = []; for i in 0..20 { s.push(j.frame(1 + 9 * i)); }\n";
-    let fit = "let a = fit(j, #{ tolerance: 0.02 });\n";
-    let transfer = format!(
-        "{pairs}{fit}let t = [s[0]]; for i in 1..20 {{ t.push(a.at(9.0 * i)); }} a.transfer(examples(t, s))"
+    let jelly = "let j = demo(\"jelly\");\n";
+    let fit = format!("{jelly}fit(j, #{{ tolerance: 0.02, space: \"gradients\" }})");
+    let bar = "let b = fit(demo(\"bar\"), #{ tolerance: 0.02 });\n";
+    let sample = format!("{bar}b.resample(frames(200000))");
+    let pairs = format!(
+        "{jelly}let a = fit(j, #{{ tolerance: 0.02 }});
+        let s = []; for i in 0..20 {{ s.push(a.at(1.0 + 9 * i)); }}
+        let t = [s[0]]; for i in 1..20 {{ t.push(a.at(9.5 * i)); }}\n"
     );
-    for (name, text) in [("fit", jelly), ("sample", sample), ("transfer", &transfer)] {
-        let native = (1..=RUNS as u32).map(|run| cancelled(text, run)).max();
+    let transfer = format!("{pairs}a.transfer(examples(t, s))");
+    for (name, before, text) in [
+        ("fit", jelly, &fit),
+        ("sample", bar, &sample),
+        ("transfer", &pairs, &transfer),
+    ] {
+        let native = cancelled(before, text);
         let folder = tempfile::tempdir().expect("a folder");
         std::fs::write(folder.path().join("r.rhai"), text).expect("the recipe is saved");
         let process = (0..RUNS as u64)
@@ -193,23 +199,29 @@ fn interruptions() {
     }
 }
 
-/// How long a run goes on after it is cancelled after `part` times 60 ms.
-fn cancelled(text: &str, part: u32) -> Duration {
-    let request = Request::default();
-    let recipe = Recipe {
-        path: "bench.rhai".into(),
-        text: text.into(),
-    };
-    let task = Task::default();
+/// How long a run goes on at most after it is cancelled at some moment, what it needs `before` remembered.
+fn cancelled(before: &str, text: &str) -> Option<Duration> {
     let scripts = Scripts::new(Arc::new(Disk), Arc::new(Memory::new(1 << 30, None)));
-    std::thread::scope(|scope| {
-        let run = scope.spawn(|| scripts.run(&recipe, &request, &task).is_ok());
-        std::thread::sleep(Duration::from_millis(60) * part);
-        let asked = Instant::now();
-        task.cancel();
-        let _ = run.join();
-        asked.elapsed()
-    })
+    let run = |text: &str, task: &Task| {
+        let recipe = Recipe {
+            path: "bench.rhai".into(),
+            text: text.into(),
+        };
+        scripts.run(&recipe, &Request::default(), task).is_ok()
+    };
+    run(before, &Task::default());
+    let after = |moment: u32| {
+        let task = Task::default();
+        std::thread::scope(|scope| {
+            let work = scope.spawn(|| run(text, &task));
+            std::thread::sleep(Duration::from_millis(20) * moment);
+            let asked = Instant::now();
+            task.cancel();
+            let _ = work.join();
+            asked.elapsed()
+        })
+    };
+    (1..=RUNS as u32).map(after).max()
 }
 
 fn interrupted(folder: &Path, after: u64) -> Duration {

@@ -19,6 +19,9 @@ use support::{Figure, View, percent, table};
 /// How many frames the loop may have: about as many as the paper's adds.
 const LENGTHS: std::ops::RangeInclusive<usize> = 12..=30;
 
+/// How many loops are tried.
+const CANDIDATES: usize = 16;
+
 /// Frames of the new loop that are shown.
 const SHOWN: usize = 7;
 
@@ -103,8 +106,8 @@ fn draw(figure: &mut Figure) -> Result<()> {
     figure.picture(&compose(&loom, &looped, &view)?)
 }
 
-/// The frame from which on, and the number of frames after which, the motion comes back nearest to where
-/// it was: place and direction.
+/// The frame from which on, and the number of frames after which, the motion comes back to where it was:
+/// of those with the nearest place and direction the one whose seam shows least.
 fn best_loop(loom: &Loom) -> Result<(usize, usize)> {
     let n = loom.frames();
     let state = |frame: usize| -> Result<(Vec<f64>, Vec<f64>)> {
@@ -118,20 +121,25 @@ fn best_loop(loom: &Loom) -> Result<(usize, usize)> {
         let squares = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b));
         squares.sum::<f64>()
     };
-    let mut best = (f64::INFINITY, (0, 0));
+    let mut loops = Vec::new();
     for length in LENGTHS {
         for start in 6..n.saturating_sub(length + 6) {
             let ((x, v), (y, w)) = (&states[start - 2], &states[start + length - 2]);
-            let gap = apart(x, y) + apart(v, w);
-            if gap < best.0 {
-                best = (gap, (start, length));
-            }
+            loops.push((apart(x, y) + apart(v, w), (start, length)));
         }
     }
-    if best.1.0 == 0 {
-        return Diagnostic::error(format!("{n} frames are too few for a loop")).err();
+    loops.sort_by(|a, b| a.0.total_cmp(&b.0));
+    loops.truncate(CANDIDATES);
+    let mut best = (f64::INFINITY, None);
+    for (_, (start, length)) in loops {
+        let (from, to) = (start as f64, (start + length) as f64);
+        let seam = add_loop(loom, from, to, 1, None)?.seam.worst();
+        if seam < best.0 {
+            best = (seam, Some((start, length)));
+        }
     }
-    Ok(best.1)
+    let few = || Diagnostic::error(format!("{n} frames are too few for a loop"));
+    best.1.ok_or_else(|| few().into())
 }
 
 /// How many frames have the same bits before and after: those before the loop's end at their own times,
