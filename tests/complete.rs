@@ -609,23 +609,71 @@ fn the_command_writes_frames_and_reports_them() {
 #[test]
 fn the_same_bytes_on_one_thread_and_on_two() {
     let folder = tempdir().unwrap();
+    sheet(40, 3).write_objs(&folder.path().join("keys"));
+    for ghost in ["off", "500"] {
+        let bytes = |threads: &str| {
+            let out = format!("out{threads}.pc2");
+            let args = ["complete", "keys", "-o", &out, "--threads", threads];
+            let args = args.into_iter().chain(["--frames", "9", "--ghost", ghost]);
+            run(command(folder.path(), args)).done();
+            fs::read(folder.path().join(out)).unwrap()
+        };
+        assert!(bytes("1") == bytes("2"), "ghost {ghost}");
+    }
+}
+
+#[test]
+fn a_recipe_completes_meshes_and_remembers_it() {
+    let folder = tempdir().unwrap();
     keys_in(folder.path());
-    let bytes = |threads: &str| {
-        let out = format!("out{threads}.pc2");
-        let args = [
-            "complete",
-            "keys",
-            "-o",
-            &out,
-            "--threads",
-            threads,
-            "--frames",
-            "30",
-        ];
-        run(command(folder.path(), args)).done();
-        fs::read(folder.path().join(out)).unwrap()
+    let recipe = r#"
+        let keys = [mesh("keys/frame_0003.obj"), mesh("keys/frame_0001.obj")];
+        let first = complete(keys, #{ times: [0, 5], frames: 6, tension: 0.5 });
+        let again = complete(keys, #{ times: [0, 5], frames: 6, tension: 0.5 });
+        check(compare(first, again).max == 0, "the same");
+        check(first.frames == 6 && fit(first, #{ tolerance: 0.1 }).frames == 6, "frames, and a loom");
+        complete(keys, #{ at: [-2, 7.5], boundary: "hermite", velocities_from: first })
+    "#;
+    fs::write(folder.path().join("r.rhai"), recipe).unwrap();
+    let ran = |args: &str| {
+        let mut command = command(folder.path(), args.split_whitespace());
+        command.env("MESHLOOM_CACHE", folder.path().join(".cache"));
+        run(command)
     };
-    assert_eq!(bytes("1"), bytes("2"));
+    let object = ran("run r.rhai -o out.pc2 --json").done().object();
+    assert_eq!(object["frames"], 2);
+    let steps = object["steps"].as_array().unwrap();
+    let made: Vec<&str> = steps
+        .iter()
+        .filter(|step| step["name"] == "complete")
+        .map(|step| step["made"].as_str().unwrap())
+        .collect();
+    assert_eq!(made, ["computed", "remembered", "computed"]);
+    let other = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    fs::write(folder.path().join("other.obj"), other).unwrap();
+    for (wrong, part) in [
+        (
+            r#"complete([mesh("keys/frame_0001.obj"), mesh("other.obj")])"#,
+            "shape 2 has 3 vertices",
+        ),
+        (r#"complete(demo("bar").slice(1, 1))"#, "one key"),
+        (
+            r#"complete(demo("bar").slice(1, 2), #{ tims: [1, 2] })"#,
+            "did you mean `times`",
+        ),
+        (
+            r#"complete(demo("bar").slice(1, 2), #{ ghost: "some" })"#,
+            "no ghost size",
+        ),
+        (
+            r#"complete(demo("bar").slice(1, 2), #{ frames: 3, at: [1] })"#,
+            "which frames",
+        ),
+        (r#"complete(5)"#, "keys must be a sequence"),
+    ] {
+        fs::write(folder.path().join("r.rhai"), wrong).unwrap();
+        ran("run r.rhai").fails_with(&["r.rhai:1", part]);
+    }
 }
 
 /// The run fails with all `parts` and a hint, and changes nothing.

@@ -1,4 +1,5 @@
 //! Keys of many sizes: built-in captures, subdivided.
+#![allow(dead_code)] // each uses its part
 
 use meshloom::demo::Demo;
 use meshloom::inbetween::Keys;

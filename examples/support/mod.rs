@@ -193,11 +193,31 @@ impl View {
 
     /// A shape (3V coordinates) on a clear background, `side` x `side` pixels of colour `front`.
     pub(crate) fn picture(&self, positions: &[f32], side: usize, front: [u8; 3]) -> Arc<Image> {
+        self.drawn(positions, None, side, front)
+    }
+
+    /// The same in a colour a vertex.
+    pub(crate) fn coloured(
+        &self,
+        positions: &[f32],
+        colours: &[[u8; 3]],
+        side: usize,
+    ) -> Arc<Image> {
+        self.drawn(positions, Some(colours), side, Style::LIGHT.front)
+    }
+
+    fn drawn(
+        &self,
+        positions: &[f32],
+        colours: Option<&[[u8; 3]]>,
+        side: usize,
+        front: [u8; 3],
+    ) -> Arc<Image> {
         let mut image = Image::new(2 * side, 2 * side);
         let surface = Surface {
             triangles: self.topology.triangles(),
             positions,
-            colours: None,
+            colours,
         };
         let style = Style {
             background: [255, 255, 255, 0],

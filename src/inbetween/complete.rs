@@ -14,7 +14,7 @@ use crate::diag::{Diagnostic, Result, Warned};
 use crate::math::cubic_spline::Ends;
 use crate::math::key_spline::{Controls, Handle, KeySpline};
 use crate::mesh::rigid_align::{mean, rigid};
-use crate::mesh::{Bounds, FrameSource, Topology};
+use crate::mesh::{Bounds, FrameSource, Topology, usual_patches};
 use crate::space::{ShapeSpace, Spaces, encode_frames};
 use crate::task::Task;
 
@@ -107,15 +107,16 @@ pub fn complete(keys: &Keys, options: &CompleteOptions, task: &Task) -> Result<W
         },
     };
     let topology = keys.poses().topology();
+    let triangles = topology.triangles().len();
     let (space, (spline, large_turns)) = match &ghost {
         None => {
-            let space = open_space(topology, &options.space, &poses)?;
+            let space = open_space(topology, &options.space, &poses, triangles)?;
             let through = track.through(&*space, &poses, &<[f64]>::to_vec, task)?;
             (space, through)
         }
         Some(ghost) => {
             let ghosts: Vec<Vec<f64>> = poses.iter().map(|pose| ghost.pick(pose)).collect();
-            let space = open_space(&ghost.topology, &options.space, &ghosts)?;
+            let space = open_space(&ghost.topology, &options.space, &ghosts, triangles)?;
             let through = track.through(&*space, &ghosts, &|pose| ghost.pick(pose), task)?;
             (space, through)
         }
@@ -144,15 +145,21 @@ pub fn complete(keys: &Keys, options: &CompleteOptions, task: &Task) -> Result<W
     })
 }
 
-/// The space about the first of `poses`.
+/// The space of `topology` about the first of `poses`. A ghost has the patches of its mesh, of which
+/// `triangles` is the size: where rotations are taken relative to what decides on the way between keys.
 fn open_space(
     topology: &Arc<Topology>,
     name: &str,
     poses: &[Vec<f64>],
+    triangles: usize,
 ) -> Result<Arc<dyn ShapeSpace>> {
     let spaces = Spaces::new(Arc::clone(topology), &poses[0]);
     let poses: Vec<&[f64]> = poses.iter().map(Vec::as_slice).collect();
-    Ok(spaces.open(name, &poses)?)
+    let ghost = topology.triangles().len() < triangles;
+    Ok(match name == "patch-lri" && ghost {
+        true => spaces.open_patched(&poses, usual_patches(triangles))?,
+        false => spaces.open(name, &poses)?,
+    })
 }
 
 /// The keys' shapes, without the drift.
@@ -447,6 +454,9 @@ fn of_turns(turns: usize) -> Option<Diagnostic> {
             "{turns} rotations turn by more than 150 degrees from one key to the next: which way round \
              is a guess"
         ))
-        .hint("add a key between, or choose --space patch-lri, where parts turn relative to what lies beside them")
+        .hint(
+            "add a key between; of whole limbs --space patch-lri takes the largest turns, and where thin \
+             triangles of shapes that lie close turn over, --space vertices is right",
+        )
     })
 }

@@ -27,7 +27,7 @@ pub use edges::Edges;
 pub use gradients::{Polar, ReferenceTriangle};
 pub use hinges::{Hinge, Hinges, NO_EDGE};
 pub use normals::{unit_vector, vertex_normals};
-pub use patches::grow_patches;
+pub use patches::{grow_patches, usual_patches};
 pub use poisson::{Poisson, PoissonAnalysis, reference_triangles};
 pub use sequence::{FrameSource, Sequence};
 pub use skeleton::{Joint, Mismatch, Skeleton, SkeletonError, SkeletonPoses};

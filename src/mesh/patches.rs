@@ -23,13 +23,10 @@ const CANDIDATES: usize = 20_000;
 const COMPACTNESS: f64 = 1.0;
 
 /// The number of patches sought for this many triangles: 8 to 200, with the root of the number of
-/// triangles between, and no more than leaves each its ten triangles.
-fn sought(triangles: usize) -> usize {
+/// triangles between.
+pub fn usual_patches(triangles: usize) -> usize {
     let root = (triangles as f64).sqrt() / 2.0;
-    (root as usize)
-        .clamp(8, 200)
-        .min(triangles / SMALLEST)
-        .max(1)
+    (root as usize).clamp(8, 200)
 }
 
 /// Splits triangles into connected patches (triangles being neighbours across edges) by growing regions
@@ -41,10 +38,11 @@ pub fn grow_patches(
     hinges: &Hinges,
     rotations: &[&[UnitQuaternion<f64>]],
     centres: &[[f64; 3]],
+    sought: usize,
 ) -> Vec<u32> {
     let features = features(rotations, centres);
     let neighbours = Neighbours::new(centres.len(), hinges);
-    let sought = sought(centres.len());
+    let sought = sought.min(centres.len() / SMALLEST).max(1);
     let mut patches = Vec::new();
     let mut seeds = first_seeds(&neighbours, &features, sought);
     for round in 0..ROUNDS {
@@ -325,7 +323,7 @@ mod tests {
     #[test]
     fn without_poses_patches_are_cells_of_ten_triangles_or_more() {
         let (hinges, centres) = strip(200);
-        let patches = grow_patches(&hinges, &[], &centres);
+        let patches = grow_patches(&hinges, &[], &centres, usual_patches(centres.len()));
         let sizes = sizes(&patches);
         assert!((8..=200).contains(&sizes.len()));
         assert!(sizes.iter().all(|&size| size >= SMALLEST));
@@ -340,7 +338,7 @@ mod tests {
         let turns: Vec<_> = (0..200)
             .map(|i| exp(&Vector3::new(0.0, 0.0, if i < 77 { 0.0 } else { 1.5 })))
             .collect();
-        let patches = grow_patches(&hinges, &[&turns], &centres);
+        let patches = grow_patches(&hinges, &[&turns], &centres, usual_patches(centres.len()));
         assert_ne!(patches[76], patches[77]);
         assert!(
             patches[..77]
@@ -352,8 +350,11 @@ mod tests {
     #[test]
     fn tiny_meshes_and_no_mesh_have_patches_too() {
         let (hinges, centres) = strip(1);
-        assert_eq!(grow_patches(&hinges, &[], &centres), [0, 0]);
+        assert_eq!(
+            grow_patches(&hinges, &[], &centres, usual_patches(centres.len())),
+            [0, 0]
+        );
         let none = Hinges::new(0, &[], &VertexCorners::new(0, &[]));
-        assert!(grow_patches(&none, &[], &[]).is_empty());
+        assert!(grow_patches(&none, &[], &[], 8).is_empty());
     }
 }

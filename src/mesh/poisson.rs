@@ -79,6 +79,8 @@ pub struct Poisson {
     analysis: Arc<PoissonAnalysis>,
     reference: Arc<[ReferenceTriangle]>,
     factor: Factor,
+    /// How strongly each vertex is drawn to its place; empty where none is.
+    springs: Vec<f64>,
     pool: Mutex<Vec<Workspace>>,
 }
 
@@ -98,12 +100,45 @@ impl Poisson {
         analysis: Arc<PoissonAnalysis>,
         reference: Arc<[ReferenceTriangle]>,
     ) -> Result<Self, SparseError> {
-        let entries = laplacian(&analysis, &reference);
+        Poisson::with_springs(analysis, reference, Vec::new())
+    }
+
+    /// The screened system: places are given too, and count beside gradients over lengths above
+    /// `screening` (in the mesh's unit, > 0). Minimises sum_f a_f |grad v - D_f|^2 + sum_i m_i |v_i - p_i|^2
+    /// / screening^2 with a third m_i of the area around each vertex.
+    ///
+    /// # Errors
+    /// As [`Poisson::new`].
+    pub fn screened(
+        analysis: Arc<PoissonAnalysis>,
+        reference: Arc<[ReferenceTriangle]>,
+        screening: f64,
+    ) -> Result<Self, SparseError> {
+        let mut springs = vec![0.0; analysis.symbolic.pattern().unknowns()];
+        for (triangle, rest) in analysis.triangles.iter().zip(&reference[..]) {
+            for &vertex in triangle {
+                springs[vertex as usize] += rest.area() / (3.0 * screening * screening);
+            }
+        }
+        // no part is without a hold, however small it is
+        for &vertex in analysis.components.first() {
+            springs[vertex as usize] += 1.0;
+        }
+        Poisson::with_springs(analysis, reference, springs)
+    }
+
+    fn with_springs(
+        analysis: Arc<PoissonAnalysis>,
+        reference: Arc<[ReferenceTriangle]>,
+        springs: Vec<f64>,
+    ) -> Result<Self, SparseError> {
+        let entries = laplacian(&analysis, &reference, &springs);
         let factor = analysis.symbolic.factor(&entries)?;
         Ok(Poisson {
             analysis,
             reference,
             factor,
+            springs,
             pool: Mutex::default(),
         })
     }
@@ -120,7 +155,8 @@ impl Poisson {
 
     /// The 3V positions whose gradients come nearest those given: `images` tells where the gradient of
     /// a triangle takes the two basis vectors of its reference plane. The first vertex of each connected
-    /// part comes out at the origin; vertices without a triangle too.
+    /// part comes out at the origin; vertices without a triangle too. In a screened system `positions`
+    /// holds the places p_i before.
     pub fn solve(&self, images: impl Fn(usize) -> [Vector3<f64>; 2] + Sync, positions: &mut [f64]) {
         let mut workspace = self.take();
         let Workspace { pulls, sides } = &mut workspace;
@@ -134,6 +170,7 @@ impl Poisson {
                 }
             });
         self.gather(pulls, sides);
+        self.draw(positions, sides);
         self.factor.solve(3, sides);
         interleave(sides, positions);
         self.lock().push(workspace);
@@ -163,6 +200,18 @@ impl Poisson {
                     (x[at], y[at], z[at]) = (sum.x, sum.y, sum.z);
                 }
             });
+    }
+
+    /// Adds the pull of the places to the right sides.
+    fn draw(&self, places: &[f64], sides: &mut [f64]) {
+        let n = self.factor.unknowns();
+        for (axis, side) in sides.chunks_exact_mut(n.max(1)).enumerate() {
+            side.par_iter_mut()
+                .zip(&self.springs)
+                .zip(places.par_chunks_exact(3))
+                .with_min_len(CHUNK)
+                .for_each(|((side, spring), place)| *side += spring * place[axis]);
+        }
     }
 
     fn take(&self) -> Workspace {
@@ -209,9 +258,13 @@ fn point(positions: &[f64], vertex: usize) -> Vector3<f64> {
 }
 
 /// The entries of the Laplacian: sum over triangles of a (grad phi_i . grad phi_j); the first vertex of
-/// each part is held by a spring of stiffness 1 (the entries have no unit), which no solution stretches.
-/// Columns are summed side by side, each over the corners at its vertex.
-fn laplacian(analysis: &PoissonAnalysis, reference: &[ReferenceTriangle]) -> Vec<f64> {
+/// each part is held by a spring of stiffness 1 (the entries have no unit), which no solution stretches,
+/// unless there are `springs`. Columns are summed side by side, each over the corners at its vertex.
+fn laplacian(
+    analysis: &PoissonAnalysis,
+    reference: &[ReferenceTriangle],
+    springs: &[f64],
+) -> Vec<f64> {
     let pattern = analysis.symbolic.pattern();
     let mut entries = vec![0.0; pattern.entries()];
     let mut rest = &mut entries[..];
@@ -243,9 +296,19 @@ fn laplacian(analysis: &PoissonAnalysis, reference: &[ReferenceTriangle]) -> Vec
             entries = after;
         }
     });
-    for &vertex in analysis.components.first() {
-        let diagonal = pattern.entry(vertex as usize, vertex as usize);
-        diagonal.into_iter().for_each(|at| entries[at] += 1.0);
+    let mut hold = |vertex: usize, spring: f64| {
+        let diagonal = pattern.entry(vertex, vertex);
+        diagonal.into_iter().for_each(|at| entries[at] += spring);
+    };
+    match springs {
+        [] => {
+            let first = analysis.components.first().iter();
+            first.for_each(|&vertex| hold(vertex as usize, 1.0));
+        }
+        springs => {
+            let all = springs.iter().enumerate();
+            all.for_each(|(vertex, &spring)| hold(vertex, spring));
+        }
     }
     entries
 }
@@ -322,6 +385,35 @@ mod tests {
         for (vertex, first) in [0, 0, 0, 0, 4, 4, 4, 7].into_iter().enumerate() {
             let expected = point(&pose, vertex) - point(&pose, first);
             assert!((point(&found, vertex) - expected).norm() < 1e-13);
+        }
+    }
+
+    #[test]
+    fn a_screened_system_gives_a_pose_back_where_its_places_are_and_follows_them() {
+        let triangles = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
+        let pose = [
+            0.1, 0.0, 0.0, 1.0, 0.2, 0.0, 0.0, 1.0, 0.3, 0.2, 0.1, 1.0, 9.0, 8.0, 7.0,
+        ];
+        let analysis = PoissonAnalysis::new(5, &triangles).unwrap();
+        let reference = reference_triangles(&triangles, &pose);
+        let poisson = Poisson::screened(analysis, reference, 2.0).unwrap();
+        let images = |face: usize| {
+            let rest = &poisson.reference()[face];
+            let [a, b, c] = triangles[face].map(|v: u32| point(&pose, v as usize));
+            rest.images(&(b - a), &(c - a))
+        };
+        for shift in [0.0, 3.0, -1e6] {
+            // the gradients do not know where the pose is
+            let places: Vec<f64> = pose.iter().map(|x| x + shift).collect();
+            let mut found = places.clone();
+            poisson.solve(images, &mut found);
+            let size = 1.0 + f64::abs(shift);
+            assert!(
+                found
+                    .iter()
+                    .zip(&places)
+                    .all(|(a, b)| (a - b).abs() < 1e-13 * size)
+            );
         }
     }
 

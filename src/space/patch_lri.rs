@@ -66,13 +66,14 @@ struct Patch {
 }
 
 impl PatchLri {
-    /// The space over a factored system with patches grown on `poses`; `reference` is the pose that the
-    /// system was made for.
+    /// The space over a factored system with about `sought` patches grown on `poses`; `reference` is the
+    /// pose that the system was made for.
     pub(super) fn grown(
         poisson: Arc<Poisson>,
         reference: Arc<[f64]>,
         hinges: &Hinges,
         poses: &[&[f64]],
+        sought: usize,
     ) -> Result<Self, SpaceError> {
         let step = poses.len().div_ceil(POSES).max(1);
         let rotations: Vec<Vec<UnitQuaternion<f64>>> = poses
@@ -87,7 +88,7 @@ impl PatchLri {
             .collect();
         let rows: Vec<&[UnitQuaternion<f64>]> = rotations.iter().map(Vec::as_slice).collect();
         let centres = centres(poisson.analysis().triangles(), &reference);
-        let patch = grow_patches(hinges, &rows, &centres);
+        let patch = grow_patches(hinges, &rows, &centres, sought);
         PatchLri::new(poisson, reference, hinges, patch)
     }
 

@@ -7,6 +7,7 @@ use super::living::Living;
 use super::{Block, Gradients, LengthsAngles, Lri, PatchLri, ShapeSpace, SpaceError, Vertices};
 use crate::mesh::{
     Hinges, Poisson, PoissonAnalysis, ReferenceTriangle, Topology, reference_triangles,
+    usual_patches,
 };
 
 /// A kind of shape space.
@@ -114,7 +115,10 @@ fn patch_lri(
 ) -> Result<Arc<dyn ShapeSpace>, SpaceError> {
     let (poisson, reference, hinges) = (spaces.poisson()?, spaces.reference(), spaces.hinges()?);
     Ok(Arc::new(match state {
-        None => PatchLri::grown(poisson, reference, &hinges, poses)?,
+        None => {
+            let sought = usual_patches(spaces.topology.triangles().len());
+            PatchLri::grown(poisson, reference, &hinges, poses, sought)?
+        }
         Some(state) => PatchLri::new(poisson, reference, &hinges, state.patches.clone())?,
     }))
 }
@@ -337,6 +341,22 @@ fn fingerprint(poses: &[&[f64]]) -> u64 {
         pose.iter().for_each(|x| x.to_bits().hash(&mut hasher));
     }
     hasher.finish()
+}
+
+impl Spaces {
+    /// `patch-lri` with about so many patches: a coarse mesh moves like a finer one that has as many.
+    ///
+    /// # Errors
+    /// As [`Spaces::open`].
+    pub fn open_patched(
+        &self,
+        poses: &[&[f64]],
+        patches: usize,
+    ) -> Result<Arc<dyn ShapeSpace>, SpaceError> {
+        let (poisson, hinges) = (self.poisson()?, self.hinges()?);
+        let grown = PatchLri::grown(poisson, self.reference(), &hinges, poses, patches)?;
+        Ok(Arc::new(grown))
+    }
 }
 
 fn kind(name: &str) -> Result<&'static SpaceKind, SpaceError> {

@@ -57,6 +57,20 @@ impl<'a> Walk<'a> {
         }
     }
 
+    /// The mean length of the ghost's edges; 1 without triangles.
+    pub(super) fn edge(&self) -> f64 {
+        let place = |vertex: u32| self.places[vertex as usize];
+        let sides = self
+            .triangles
+            .iter()
+            .flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+        let sum: f64 = sides.map(|[a, b]| (place(a) - place(b)).norm()).sum();
+        match sum > 0.0 {
+            true => sum / (3 * self.triangles.len()) as f64,
+            false => 1.0,
+        }
+    }
+
     /// The carriers of all vertices of the mesh, 3V positions in the first key; `absorber` tells where
     /// the walks start.
     pub(super) fn to_vertices(&self, positions: &[f64], absorber: &[u32]) -> Vec<Carrier> {

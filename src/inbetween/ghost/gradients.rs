@@ -1,6 +1,9 @@
 //! Deformation transfer from a ghost (Sumner & Popovic 2004; X19 §4.3): each triangle of the mesh takes
 //! the blended turn of its carrier as its gradient, and one sparse solve finds the places. The system is
 //! that of the first key, factored once for all frames.
+//!
+//! Gradients alone do not say where a limb ends: errors along it add up. Over lengths of more than a few
+//! of the ghost's edges the places of the direct lift ([`super::direct`]) count too.
 
 use std::sync::Arc;
 
@@ -22,12 +25,13 @@ pub(super) struct Gradients {
 }
 
 impl Gradients {
-    /// For the keys' shapes `poses`; `turns` gives the turns of the ghost's vertices at a key. The
+    /// For the keys' shapes `poses`; places count over lengths above `screening`. `turns` gives the turns of the ghost's vertices at a key. The
     /// residual is kept where `keep` says so.
     pub(super) fn new(
         topology: &Topology,
         poses: &[Vec<f64>],
-        carriers: &[Carrier],
+        carriers: Vec<Carrier>,
+        screening: f64,
         turns: impl Fn(usize) -> Vec<Turn>,
         keep: bool,
     ) -> Result<Self> {
@@ -35,7 +39,8 @@ impl Gradients {
         let analysis =
             PoissonAnalysis::new(topology.vertices(), triangles).map_err(SpaceError::from)?;
         let reference = reference_triangles(triangles, &poses[0]);
-        let poisson = Poisson::new(analysis, Arc::clone(&reference)).map_err(SpaceError::from)?;
+        let poisson = Poisson::screened(analysis, Arc::clone(&reference), screening);
+        let poisson = poisson.map_err(SpaceError::from)?;
         let keys = if keep { poses.len() } else { 0 };
         let turns: Vec<Vec<Turn>> = (0..keys).map(turns).collect();
         let residual = Residual::new(triangles.len(), keys, |face, key| {
@@ -51,13 +56,13 @@ impl Gradients {
         });
         Ok(Gradients {
             poisson,
-            carriers: carriers.to_vec(),
+            carriers,
             residual,
         })
     }
 
-    /// Writes the positions for the turns of the ghost's vertices and the weights of the keys; each
-    /// connected part where it happens to be.
+    /// Turns the positions of the direct lift into those that have the gradients, for the turns of the
+    /// ghost's vertices and the weights of the keys.
     pub(super) fn integrate(&self, turns: &[Turn], weights: &[f64], positions: &mut [f64]) {
         let reference = self.poisson.reference();
         let images = |face: usize| {

@@ -3,9 +3,9 @@
 //!
 //! One sequence of half-edge collapses serves all keys ([`crate::mesh::collapse`]), so the ghost's
 //! vertices are vertices of the mesh. How the ghost's triangles around each of its vertices have turned
-//! and stretched since the first key ([`turns`]) is carried to the mesh ([`Carrier`]): to its triangles,
-//! whose gradients are then integrated ([`Gradients`], deformation transfer), or to its vertices
-//! directly ([`Direct`]). What is missing at the keys is kept in the carried frames and blended by the
+//! and stretched since the first key ([`turns`]) is carried to the mesh ([`carrier`]): to its vertices
+//! ([`direct`]) and, unless that is to be all, to its triangles, whose gradients are then integrated
+//! ([`gradients`], deformation transfer). What is missing at the keys is kept in the carried frames and blended by the
 //! spline's cardinal weights, so keys are reproduced.
 
 mod carrier;
@@ -16,13 +16,15 @@ mod turns;
 
 use std::sync::Arc;
 
+use nalgebra::Vector3;
 use serde::Serialize;
 
 use super::keys::Keys;
 use crate::diag::{Diagnostic, Result, Warned};
 use crate::math::key_spline::KeySpline;
 use crate::mesh::collapse::{CollapseError, collapse};
-use crate::mesh::{Components, FrameSource, Topology};
+use crate::mesh::rigid_align::mean as mean_vertex;
+use crate::mesh::{FrameSource, Topology};
 use carrier::Walk;
 use direct::Direct;
 use gradients::Gradients;
@@ -212,21 +214,20 @@ fn refused(error: CollapseError, faces: usize) -> Box<Diagnostic> {
     })
 }
 
+/// Places count beside gradients over more than so many edges of the ghost.
+const SCREENING: f64 = 0.7;
+
 /// A mesh that follows its ghost.
 pub(super) struct Following {
     turns: Turns,
-    way: Way,
+    direct: Direct,
+    /// None for the direct lift.
+    gradients: Option<Gradients>,
     /// Cardinal weights of the keys by time; none without a residual.
     weights: Option<KeySpline>,
     /// The mean vertex of the mesh by time.
     mean: KeySpline,
-    parts: Parts,
-}
-
-/// How places are found.
-enum Way {
-    Solve(Gradients),
-    Direct(Direct),
+    vertices: usize,
 }
 
 impl Following {
@@ -243,39 +244,32 @@ impl Following {
         let ghosts: Vec<Vec<f64>> = poses.iter().map(|pose| ghost.pick(pose)).collect();
         let turns = Turns::new(ghost.topology.triangles(), &ghosts[0]);
         let walk = Walk::new(ghost.topology.triangles(), &ghosts[0]);
-        let keep = weights.is_some();
-        let way = match lift {
-            Lift::Solve => Way::Solve(Gradients::new(
-                topology,
-                poses,
-                &walk.to_faces(topology.triangles(), &poses[0], &ghost.absorber),
-                |key| turns.of(&ghosts[key]),
-                keep,
-            )?),
-            Lift::Direct => Way::Direct(Direct::new(
-                poses,
-                &ghosts,
-                walk.to_vertices(&poses[0], &ghost.absorber),
-                |key| turns.of(&ghosts[key]),
-                keep,
-            )),
+        let (keep, at_key) = (weights.is_some(), |key: usize| turns.of(&ghosts[key]));
+        let gradients = match lift {
+            Lift::Direct => None,
+            Lift::Solve => {
+                let triangles = topology.triangles();
+                let carriers = walk.to_faces(triangles, &poses[0], &ghost.absorber);
+                let screening = SCREENING * walk.edge();
+                Some(Gradients::new(
+                    topology, poses, carriers, screening, at_key, keep,
+                )?)
+            }
         };
-        let parts = Parts {
-            components: Components::new(topology.vertices(), topology.triangles()),
-            ghost: ghost.vertices.clone(),
-        };
+        let carriers = walk.to_vertices(&poses[0], &ghost.absorber);
         Ok(Following {
+            direct: Direct::new(poses, &ghosts, carriers, at_key, keep),
+            gradients,
             turns,
-            way,
             weights,
             mean,
-            parts,
+            vertices: ghost.vertices.len(),
         })
     }
 
     /// How many coordinates the ghost has.
     pub(super) fn ghost_width(&self) -> usize {
-        3 * self.parts.ghost.len()
+        3 * self.vertices
     }
 
     /// Writes the 3V positions of the mesh for the ghost's positions at time `t`.
@@ -286,45 +280,16 @@ impl Following {
             weights.resize(spline.width(), 0.0);
             spline.evaluate(t, &mut weights);
         }
-        match &self.way {
-            Way::Solve(gradients) => {
-                gradients.integrate(&turns, &weights, positions);
-                self.parts.place(ghost, positions);
-            }
-            Way::Direct(direct) => direct.place(&turns, ghost, &weights, positions),
+        self.direct.place(&turns, ghost, &weights, positions);
+        if let Some(gradients) = &self.gradients {
+            gradients.integrate(&turns, &weights, positions);
         }
         let mut mean = [0.0; 3];
         self.mean.evaluate(t, &mut mean);
-        let off = nalgebra::Vector3::from(mean) - crate::mesh::rigid_align::mean(positions);
-        for (at, place) in positions.iter_mut().enumerate() {
-            *place += off[at % 3];
-        }
-    }
-}
-
-/// The connected parts of the mesh, each of which has vertices of the ghost.
-struct Parts {
-    components: Components,
-    ghost: Vec<u32>,
-}
-
-impl Parts {
-    /// Moves each part so that the mean of its ghost vertices is where the ghost has it.
-    fn place(&self, ghost: &[f64], positions: &mut [f64]) {
-        let part = self.components.part();
-        let mut sums = vec![[0.0; 4]; self.components.count()];
-        for (&vertex, place) in self.ghost.iter().zip(ghost.chunks_exact(3)) {
-            let at = 3 * vertex as usize;
-            let sum = &mut sums[part[vertex as usize] as usize];
+        let off = Vector3::from(mean) - mean_vertex(positions);
+        for place in positions.chunks_exact_mut(3) {
             for axis in 0..3 {
-                sum[axis] += place[axis] - positions[at + axis];
-            }
-            sum[3] += 1.0;
-        }
-        for (place, &part) in positions.chunks_exact_mut(3).zip(part) {
-            let sum = &sums[part as usize];
-            for axis in 0..3 {
-                place[axis] += sum[axis] / sum[3];
+                place[axis] += off[axis];
             }
         }
     }
