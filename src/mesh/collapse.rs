@@ -5,7 +5,8 @@
 //! and need no correspondences. Its cost is the sum over the poses of the squared distances (weighted by
 //! area) of the place it moves to from the planes of all triangles that have gone through it, plus a
 //! small multiple of its distance from the places themselves, which spreads what is left over flat
-//! regions; borders count as planes perpendicular to them. Cheapest first; ties by the vertices' numbers.
+//! regions; borders count as planes perpendicular to them. Cheapest first, as last looked at; ties by the
+//! vertices' numbers.
 //!
 //! A collapse keeps the surface a manifold (the link condition of Dey et al. 1999), keeps borders where
 //! they are, and turns no triangle by more than about 78 degrees in any pose; when no such collapse is
@@ -391,33 +392,38 @@ impl Mesh {
         }
     }
 
-    /// Collapses while there are candidates and more than `target` triangles.
+    /// Collapses while there are candidates and more than `target` triangles. What has changed around a
+    /// vertex is looked at when its turn comes, or at once where it had no collapse before.
     fn run(&mut self, target: usize, limit: f64, curve: &mut Vec<(usize, f64)>) {
-        let candidates: Vec<Candidate> = (0..self.around.len() as u32)
+        let candidates: Vec<Option<Candidate>> = (0..self.around.len() as u32)
             .into_par_iter()
             .with_min_len(CHUNK)
             .map_init(Scratch::default, |scratch, vertex| {
                 self.candidate(vertex, limit, scratch)
             })
-            .flatten_iter()
             .collect();
-        let mut heap = BinaryHeap::from(candidates);
+        let mut idle: Vec<bool> = candidates.iter().map(Option::is_none).collect();
+        let mut heap: BinaryHeap<Candidate> = candidates.into_iter().flatten().collect();
         let (mut scratch, mut ring) = (Scratch::default(), Vec::new());
         while self.left > target {
             let Some(candidate) = heap.pop() else { return };
-            if self.stamp[candidate.vertex as usize] != candidate.stamp {
+            let vertex = candidate.vertex;
+            if self.stamp[vertex as usize] != candidate.stamp {
+                let found = self.candidate(vertex, limit, &mut scratch);
+                idle[vertex as usize] = found.is_none();
+                heap.extend(found);
                 continue;
             }
             self.apply(&candidate);
             curve.push((self.left, candidate.cost.max(0.0)));
             self.neighbours(candidate.onto, &mut ring);
-            for vertex in ring
-                .iter()
-                .map(|(vertex, _)| *vertex)
-                .chain([candidate.onto])
-            {
-                self.stamp[vertex as usize] += 1;
-                heap.extend(self.candidate(vertex, limit, &mut scratch));
+            for near in ring.iter().map(|(near, _)| *near).chain([candidate.onto]) {
+                self.stamp[near as usize] += 1;
+                if idle[near as usize] {
+                    let found = self.candidate(near, limit, &mut scratch);
+                    idle[near as usize] = found.is_none();
+                    heap.extend(found);
+                }
             }
         }
     }

@@ -39,6 +39,7 @@ fn frames(context: &Context, value: Dynamic, what: &str) -> Result<Frames> {
             "{what} must be a sequence or an array of meshes, this is {}",
             other.kind()
         ))
+        .hint("such as `demo(\"cactus\")` or `[mesh(\"a.obj\"), mesh(\"b.obj\")]`")
         .err(),
     }
 }
