@@ -51,6 +51,9 @@ fn main() -> ExitCode {
     })
 }
 
+/// The shape at a time.
+type Shapes<'a> = &'a dyn Fn(f64) -> Vec<f64>;
+
 /// Where the next row of shapes goes.
 struct Pen<'a> {
     picture: &'a mut Scene,
@@ -60,7 +63,7 @@ struct Pen<'a> {
 
 impl Pen<'_> {
     /// Shapes at `times`, by what they are to the keys.
-    fn row(&mut self, keys: &Keys, at: &dyn Fn(f64) -> Vec<f64>, times: &[f64]) {
+    fn row(&mut self, keys: &Keys, at: Shapes<'_>, times: &[f64]) {
         let view = View::looking(keys.poses(), [0.5, 0.25]);
         let [first, last] = keys.ends();
         let pictures: Vec<_> = times
@@ -145,7 +148,7 @@ fn stretch(keys: &Keys, time: f64, shape: &[f64]) -> [f64; 2] {
 }
 
 /// The largest root mean square and the worst of a path over its in-between times.
-fn stretches(keys: &Keys, at: &dyn Fn(f64) -> Vec<f64>) -> [f64; 2] {
+fn stretches(keys: &Keys, at: Shapes<'_>) -> [f64; 2] {
     let [first, last] = keys.ends();
     let all = (1..20).map(|i| {
         let time = first + (last - first) * f64::from(i) / 20.0;
@@ -157,7 +160,7 @@ fn stretches(keys: &Keys, at: &dyn Fn(f64) -> Vec<f64>) -> [f64; 2] {
 }
 
 /// How sharply positions turn at the middle key: the acceleration there over the mean elsewhere.
-fn corner(keys: &Keys, at: &dyn Fn(f64) -> Vec<f64>) -> f64 {
+fn corner(keys: &Keys, at: Shapes<'_>) -> f64 {
     let bend = |time: f64| {
         let [a, b, c] = [time - 1.0, time, time + 1.0].map(at);
         let bends = a.iter().zip(&b).zip(&c).map(|((a, b), c)| a - 2.0 * b + c);
@@ -174,7 +177,7 @@ fn figure_1(figure: &mut Figure, pen: &mut Pen<'_>) -> Result<()> {
     let keys = demo_keys("cactus", &[0, 1, 2], 0);
     let ours = motion(&keys, "patch-lri", Boundary::Natural)?;
     let vertices = motion(&keys, "vertices", Boundary::Natural)?;
-    let paths: [(&str, &dyn Fn(f64) -> Vec<f64>); 3] = [
+    let paths: [(&str, Shapes<'_>); 3] = [
         ("geodesics, piecewise linear", &|time| straight(&ours, time)),
         ("splines of the vertices", &|time| vertices.at(time)),
         ("splines in patch-lri", &|time| ours.at(time)),
