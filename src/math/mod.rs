@@ -8,6 +8,7 @@ pub mod curve_join;
 pub mod direction;
 pub mod growing_qr;
 pub mod key_spline;
+pub mod lanes;
 pub mod layout;
 pub mod least_squares;
 pub mod monotone;

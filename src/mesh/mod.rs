@@ -24,7 +24,7 @@ pub use components::Components;
 pub use corners::VertexCorners;
 pub use dual_tree::{Cost, DualTree, Step, dual_trees};
 pub use edges::Edges;
-pub use gradients::{Polar, ReferenceTriangle};
+pub use gradients::{Polar, Polars, ReferenceTriangle, polars, stretches_in_space};
 pub use hinges::{Hinge, Hinges, NO_EDGE};
 pub use normals::{unit_vector, vertex_normals};
 pub use patches::{grow_patches, usual_patches};

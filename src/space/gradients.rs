@@ -22,10 +22,11 @@ use super::placement::{Placement, blocks_from, follow_rotation, triple};
 use super::registry::State;
 use super::scales::{Scales, area_shares};
 use super::{Block, Invariance, ShapeSpace};
-use crate::math::rotation::{exp, log};
-use crate::mesh::{Poisson, Polar, ReferenceTriangle};
+use crate::math::lanes::{LANES, Lanes, times};
+use crate::math::rotation::{exp, log, logs, products, quaternions};
+use crate::mesh::{Poisson, Polar, ReferenceTriangle, stretches_in_space};
 
-/// Triangles that one thread takes at a time: small meshes are shared evenly too.
+/// Triangles that one thread takes at a time: small meshes are shared evenly too. A multiple of [`LANES`].
 const CHUNK: usize = 512;
 
 /// The space of deformation gradients.
@@ -168,20 +169,43 @@ pub(super) fn encode_faces(
         .zip(stretches.par_chunks_mut(6 * CHUNK))
         .enumerate()
         .for_each(|(chunk, (rotations, stretches))| {
-            let rows = rotations
-                .chunks_exact_mut(3)
-                .zip(stretches.chunks_exact_mut(6));
-            for (at, (turn, entries)) in rows.enumerate() {
-                let face = CHUNK * chunk + at;
-                let (polar, share) = (&polars[face], shares[face]);
-                let w = log(&(back(face) * polar.rotation)) * (rotation * share);
-                turn.copy_from_slice(w.as_slice());
-                let s = reference[face].stretch_in_space(polar.stretch);
+            let first = CHUNK * chunk;
+            let faces = first..first + rotations.len() / 3;
+            let (reference, polars) = (&reference[faces.clone()], &polars[faces.clone()]);
+            let shares = &shares[faces];
+            let fours = reference.as_chunks::<LANES>().0;
+            for (group, four) in fours.iter().enumerate() {
+                let at = LANES * group;
+                let turns = quaternions(|lane| polars[at + lane].rotation);
+                let back = quaternions(|lane| back(first + at + lane));
+                let share = Lanes::of(|lane| shares[at + lane]);
+                let w = logs(&products(&back, &turns));
+                let w = times(&w, Lanes::splat(rotation) * share);
+                interleave(&w, &mut rotations[3 * at..]);
+                let s = [0, 1, 2].map(|entry| Lanes::of(|lane| polars[at + lane].stretch[entry]));
+                let mut s = stretches_in_space(four, &s);
+                for (entry, doubled) in s.iter_mut().zip(OFF_DIAGONAL) {
+                    *entry = *entry * (Lanes::splat(stretch * doubled) * share);
+                }
+                interleave(&s, &mut stretches[6 * at..]);
+            }
+            for at in LANES * fours.len()..reference.len() {
+                let w = log(&(back(first + at) * polars[at].rotation)) * (rotation * shares[at]);
+                rotations[3 * at..3 * at + 3].copy_from_slice(w.as_slice());
+                let s = reference[at].stretch_in_space(polars[at].stretch);
                 for entry in 0..6 {
-                    entries[entry] = s[entry] * (stretch * share * OFF_DIAGONAL[entry]);
+                    stretches[6 * at + entry] =
+                        s[entry] * (stretch * OFF_DIAGONAL[entry] * shares[at]);
                 }
             }
         });
+}
+
+/// Writes the numbers of four triangles, triangle after triangle.
+fn interleave<const N: usize>(numbers: &[Lanes; N], out: &mut [f64]) {
+    for (lane, out) in out.as_chunks_mut::<N>().0[..LANES].iter_mut().enumerate() {
+        *out = numbers.map(|number| number.0[lane]);
+    }
 }
 
 /// S b1 and S b2 of one triangle from its six coordinates, which are multiplied by `scale`.

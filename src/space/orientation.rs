@@ -1,13 +1,15 @@
 //! How a shape, and parts of it, are turned against the reference pose.
 
-use nalgebra::{Matrix3, UnitQuaternion};
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use super::placement::triple;
+use crate::math::lanes::{LANES, Lanes, Vectors, minus, vectors};
 use crate::math::rotation::nearest;
-use crate::mesh::{Polar, ReferenceTriangle};
+use crate::mesh::{Polar, ReferenceTriangle, polars};
 
-/// Triangles that one thread takes at a time; sums are taken chunk by chunk in this order.
+/// Triangles that one thread takes at a time, a multiple of [`LANES`]; sums are taken chunk by chunk in this
+/// order.
 const CHUNK: usize = 512;
 
 /// The polar factors of all triangles of a shape and its mean rotation: the rotation nearest the
@@ -17,48 +19,121 @@ pub(super) fn polar_factors(
     reference: &[ReferenceTriangle],
     triangles: &[[u32; 3]],
     positions: &[f64],
-    polars: &mut Vec<Polar>,
+    factors: &mut Vec<Polar>,
 ) -> UnitQuaternion<f64> {
-    let sides = |face: usize| {
-        let [a, b, c] = triangles[face].map(|vertex| triple(positions, vertex as usize));
-        [b - a, c - a]
+    let none = Polar {
+        rotation: UnitQuaternion::identity(),
+        stretch: [0.0; 3],
     };
-    polars.resize(
-        triangles.len(),
-        Polar {
-            rotation: UnitQuaternion::identity(),
-            stretch: [0.0; 3],
-        },
-    );
-    let sums: Vec<(Matrix3<f64>, Vec<usize>)> = polars
+    factors.resize(triangles.len(), none);
+    let sums: Vec<(Matrix3<f64>, Vec<usize>)> = factors
         .par_chunks_mut(CHUNK)
+        .zip(reference.par_chunks(CHUNK))
+        .zip(triangles.par_chunks(CHUNK))
         .enumerate()
-        .map(|(chunk, polars)| {
-            let mut sum = Matrix3::zeros();
-            let mut flat = Vec::new();
-            for (at, out) in polars.iter_mut().enumerate() {
-                let face = CHUNK * chunk + at;
-                let [e1, e2] = sides(face);
-                match reference[face].polar(&e1, &e2) {
-                    Some(polar) => {
-                        if !reference[face].degenerate {
-                            let turn = polar.rotation.to_rotation_matrix();
-                            sum += turn.matrix() * reference[face].area();
-                        }
-                        *out = polar;
-                    }
-                    None => flat.push(face),
-                }
-            }
-            (sum, flat)
+        .map(|(chunk, ((factors, reference), triangles))| {
+            let mut part = Part {
+                reference,
+                triangles,
+                positions,
+                sum: Matrix3::zeros(),
+                flat: Vec::new(),
+            };
+            part.run(factors);
+            let flat = part.flat.iter().map(|face| CHUNK * chunk + face);
+            (part.sum, flat.collect())
         })
         .collect();
     let mean = nearest(&sums.iter().map(|(sum, _)| sum).sum()).rotation;
     for face in sums.into_iter().flat_map(|(_, flat)| flat) {
-        let [e1, e2] = sides(face);
-        polars[face] = reference[face].polar_near(&e1, &e2, &mean);
+        let [e1, e2] = sides(&triangles[face], positions);
+        factors[face] = reference[face].polar_near(&e1, &e2, &mean);
     }
     mean
+}
+
+/// One thread's triangles.
+struct Part<'a> {
+    reference: &'a [ReferenceTriangle],
+    triangles: &'a [[u32; 3]],
+    positions: &'a [f64],
+    /// Area-weighted sum of the rotations.
+    sum: Matrix3<f64>,
+    /// Triangles without a plane in the shape, whose factors are still to be found.
+    flat: Vec<usize>,
+}
+
+impl Part<'_> {
+    fn run(&mut self, factors: &mut [Polar]) {
+        let mut sums = [[Lanes::splat(0.0); 3]; 3];
+        let fours = self.reference.as_chunks::<LANES>().0;
+        for (group, four) in fours.iter().enumerate() {
+            let first = LANES * group;
+            let out = &mut factors[first..first + LANES];
+            if !self.four(four, first, &mut sums, out) {
+                (0..LANES).for_each(|lane| self.one(first + lane, &mut out[lane]));
+            }
+        }
+        for face in LANES * fours.len()..factors.len() {
+            self.one(face, &mut factors[face]);
+        }
+        self.sum += Matrix3::from_fn(|i, j| sums[i][j].sum());
+    }
+
+    /// Four triangles side by side; false when they need care.
+    fn four(
+        &self,
+        four: &[ReferenceTriangle; LANES],
+        first: usize,
+        sums: &mut [Vectors; 3],
+        out: &mut [Polar],
+    ) -> bool {
+        let corner = |which: usize| {
+            vectors(|lane| {
+                let vertex = 3 * self.triangles[first + lane][which] as usize;
+                [0, 1, 2].map(|axis| self.positions[vertex + axis])
+            })
+        };
+        let (a, b, c) = (corner(0), corner(1), corner(2));
+        let Some(found) = polars(four, &minus(&b, &a), &minus(&c, &a)) else {
+            return false;
+        };
+        let areas = Lanes::of(|lane| four[lane].area());
+        for (sums, row) in sums.iter_mut().zip(&found.matrix) {
+            for (sum, entry) in sums.iter_mut().zip(row) {
+                *sum = *sum + *entry * areas;
+            }
+        }
+        for (lane, out) in out.iter_mut().enumerate() {
+            let [w, x, y, z] = found.quaternion.map(|part| part.0[lane]);
+            *out = Polar {
+                rotation: UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z)),
+                stretch: found.stretch.map(|entry| entry.0[lane]),
+            };
+        }
+        true
+    }
+
+    fn one(&mut self, face: usize, out: &mut Polar) {
+        let triangle = &self.reference[face];
+        let [e1, e2] = sides(&self.triangles[face], self.positions);
+        match triangle.polar(&e1, &e2) {
+            Some(polar) => {
+                if !triangle.degenerate {
+                    let turn = polar.rotation.to_rotation_matrix();
+                    self.sum += turn.matrix() * triangle.area();
+                }
+                *out = polar;
+            }
+            None => self.flat.push(face),
+        }
+    }
+}
+
+/// From corner 0 to corners 1 and 2.
+fn sides(triangle: &[u32; 3], positions: &[f64]) -> [Vector3<f64>; 2] {
+    let [a, b, c] = triangle.map(|vertex| triple(positions, vertex as usize));
+    [b - a, c - a]
 }
 
 /// The rotation of each group of triangles (the one nearest their area-weighted sum), and of all
