@@ -202,8 +202,11 @@ fn time_stays_and_an_edit_before_or_after_is_the_same() {
             for frame in 1..=before.frames() {
                 let t = frame as f64;
                 let error = farthest(&before.at(t).unwrap(), &after.at(t).unwrap());
+                // its Gauss-Newton steps end when a step gains a thousandth
+                let loose = space.name == "lengths-angles";
+                let bound = if loose { 1e-3 } else { ROUNDING };
                 assert!(
-                    error < ROUNDING,
+                    error < bound,
                     "{}, {edit:?}, frame {frame}: {error}",
                     space.name
                 );

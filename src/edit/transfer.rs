@@ -36,6 +36,10 @@ const NEARLY_SAME: f64 = 0.02;
 /// are reported.
 const OUTSIDE: f64 = 0.5;
 
+/// An example whose distance from a frame falls below this part of itself when it takes the frame's branches
+/// is that frame, whole turns away.
+const BRANCHES: f64 = 0.5;
+
 /// Distances from the reference pose below this part of the farthest example's are none.
 const AT_REST: f64 = 1e-3;
 
@@ -156,7 +160,10 @@ impl Map {
         let target = open(&topology, name, &targets)?;
         task.check()?;
         task.step();
-        let q: Vec<Vec<f64>> = sources.iter().map(|q| encoded(&*source, q)).collect();
+        let mut q: Vec<Vec<f64>> = sources.iter().map(|q| encoded(&*source, q)).collect();
+        if same {
+            take_branches_of(loom, &*source, &mut q, task)?;
+        }
         let mut r: Vec<Vec<f64>> = targets.iter().map(|r| encoded(&*target, r)).collect();
         for (q, r) in q.iter().zip(&mut r) {
             align_mean_rotation((&*source, q), (&*target, r));
@@ -203,10 +210,7 @@ impl Map {
 
     /// The loom's shape at a place of its map, in coordinates about q_0.
     fn seen(&self, loom: &Loom, p: Point) -> Vec<f64> {
-        let mut x = vec![0.0; loom.shape().modes()];
-        loom.pose().evaluate(p, &mut x);
-        let mut z = vec![0.0; loom.shape().dimension()];
-        loom.shape().evaluate(&x, &mut z);
+        let z = coordinates_at(loom, p);
         if self.same {
             return z;
         }
@@ -345,6 +349,50 @@ fn encoded(space: &dyn ShapeSpace, shape: &[f64]) -> Vec<f64> {
     let mut coordinates = vec![0.0; space.dimension()];
     space.encode(shape, &mut coordinates);
     coordinates
+}
+
+/// h(g(p)).
+fn coordinates_at(loom: &Loom, p: Point) -> Vec<f64> {
+    let mut x = vec![0.0; loom.shape().modes()];
+    loom.pose().evaluate(p, &mut x);
+    let mut z = vec![0.0; loom.shape().dimension()];
+    loom.shape().evaluate(&x, &mut z);
+    z
+}
+
+/// Gives examples that are frames of the loom the branches of those frames. A sequence draws the branches
+/// of its rotations from frame to frame, an example has principal ones: the same shape may lie whole turns
+/// away. An example that no frame comes near but for branches keeps its own.
+fn take_branches_of(
+    loom: &Loom,
+    space: &dyn ShapeSpace,
+    examples: &mut [Vec<f64>],
+    task: &Task,
+) -> Result<()> {
+    let mut found: Vec<(f64, Option<Vec<f64>>)> = vec![(f64::INFINITY, None); examples.len()];
+    for frame in 1..=loom.frames() {
+        task.check()?;
+        let z = coordinates_at(loom, loom.position_at(frame as f64)?);
+        for (example, found) in examples.iter().zip(&mut found).skip(1) {
+            let mut followed = example.clone();
+            space.follow(&z, &mut followed);
+            let (after, before) = (distance(&z, &followed), distance(&z, example));
+            if after < BRANCHES * before && after < found.0 {
+                *found = (after, Some(followed));
+            }
+        }
+    }
+    for (example, (_, followed)) in examples.iter_mut().zip(found) {
+        if let Some(followed) = followed {
+            *example = followed;
+        }
+    }
+    Ok(())
+}
+
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    let squares = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b));
+    squares.sum::<f64>().sqrt()
 }
 
 /// Takes the branch of the target's mean rotation that is nearest the source's.
