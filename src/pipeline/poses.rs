@@ -4,7 +4,7 @@ use super::key::KeyBuilder;
 use super::memory::Remembered;
 use super::value::{Frames, Keyed, LoomValue, ShapeValue};
 use super::workbench::{Found, Workbench};
-use super::{best_space, compare_spaces};
+use super::{best_space, compare_spaces, why_best_space};
 use crate::diag::{Diagnostic, Result, Warned};
 use crate::edit;
 use crate::edit::transfer::{Examples, transfer};
@@ -142,7 +142,8 @@ impl Workbench {
             let found = compare_spaces(&frames.value, self.task())?;
             let spaces: Vec<_> = found.iter().map(super::SpaceReport::data).collect();
             let best = best_space(&found).map(|space| space.name);
-            let data = serde_json::json!({ "best": best, "spaces": spaces });
+            let why = why_best_space(&found);
+            let data = serde_json::json!({ "best": best, "why": why, "spaces": spaces });
             Ok(Spaces(data.to_string()))
         })?;
         self.note("spaces", format!("{} frames", frames.value.frames()), made);

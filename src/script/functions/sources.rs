@@ -224,8 +224,9 @@ mod functions {
     ///
     /// `spaces(sequence)`
     ///
-    /// Gives a map: best, the name of the space that suits it; spaces, for each its space, dimension,
-    /// modes, stored numbers, left_out errors in vertex positions (psi, linear, cubic) and large_turns.
+    /// Gives a map: best, the name of the space that suits it; why, in words; spaces, for each its space,
+    /// dimension, modes, stored numbers, left_out errors in vertex positions (psi, linear, cubic) and
+    /// large_turns.
     ///
     /// ```rhai
     /// let found = spaces(demo("bar").slice(1, 7));
