@@ -2,6 +2,8 @@
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::mpsc::{self, Receiver, TryRecvError};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use serde_json::{Value as Json, json};
@@ -25,6 +27,8 @@ const QUIET: Duration = Duration::from_millis(30);
 const PATIENCE: Duration = Duration::from_millis(500);
 /// How soon a live run notices that it has ended.
 const LOOK: Duration = Duration::from_millis(5);
+/// A run that was cancelled and does not end for so long is no longer waited for.
+const DROPPED: Duration = Duration::from_millis(60);
 /// How long a live run waits for a change at a time.
 const WAIT: Duration = Duration::from_secs(1);
 
@@ -98,7 +102,7 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<Outcome> {
         return Ok(checked(session, &runs.check(&recipe, &request)?));
     }
     if args.live {
-        return live(args, path, &runs, session);
+        return live(args, path, runs, session);
     }
     let outcome = runs
         .run(&recipe, &request, args.time_limit, &session.task)
@@ -208,36 +212,79 @@ fn told(session: &Session, title: &str, outcome: &recipe::Outcome, written: &[Pa
 }
 
 /// The single run, repeated: what is watched is what the last run read. A later save cancels the run in
-/// flight; an error is told and waited out. Ends when the process is told to.
-fn live(args: &Args, path: &Path, runs: &Runs, session: &Session) -> Result<Outcome> {
+/// flight, whose answer is dropped if it does not end soon; an error is told and waited out. Ends when the
+/// process is told to.
+fn live(args: &Args, path: &Path, runs: Runs, session: &Session) -> Result<Outcome> {
+    let job = Arc::new(Job {
+        path: path.to_path_buf(),
+        request: args.request(),
+        output: args.output.clone(),
+        time_limit: args.time_limit,
+        runs,
+    });
     let mut reads = vec![path.to_path_buf()];
     loop {
-        let watch = session.keep(Watch::new(&folders(&reads), false)?);
+        let mut watch = session.keep(Watch::new(&folders(&reads), false)?);
         let task = session.task.sibling();
         let begun = SystemTime::now();
-        let (result, interrupted) = std::thread::scope(|scope| {
-            let run = scope.spawn(|| once(args, path, runs, &task));
-            let interrupted = changed(&watch, &reads, LOOK, || run.is_finished());
-            if interrupted {
-                task.cancel();
-            }
-            (run.join(), interrupted)
-        });
-        // A panic in a run has printed itself; the next save runs again.
-        let Ok(run) = result else { continue };
+        let mut run = job.start(&task);
+        let interrupted = changed(&watch, &reads, LOOK, || run.is_over());
+        if interrupted {
+            task.cancel();
+            run.wait(DROPPED);
+        }
         session.progress.rest();
-        show(session, path, &run);
-        let watch = if run.reads == reads {
-            watch
-        } else {
-            session.keep(Watch::new(&folders(&run.reads), false)?)
-        };
-        reads = run.reads;
-        // What was saved before it was watched has to be asked for.
-        if !interrupted && !saved_since(&reads, begun) {
+        let mut quiet = !interrupted;
+        if let Some(run) = run.answer {
+            show(session, path, &run);
+            if run.reads != reads {
+                watch = session.keep(Watch::new(&folders(&run.reads), false)?);
+            }
+            reads = run.reads;
+            // What was saved before it was watched has to be asked for.
+            quiet &= !saved_since(&reads, begun);
+        }
+        if quiet {
             changed(&watch, &reads, WAIT, || false);
         }
         watch.calm(QUIET, PATIENCE, &mut BTreeSet::new());
+    }
+}
+
+/// What a live run does again and again.
+struct Job {
+    path: PathBuf,
+    request: Request,
+    output: Option<PathBuf>,
+    time_limit: Option<f64>,
+    runs: Runs,
+}
+
+/// A run in a thread of its own. It has no answer if it was dropped, or panicked: the panic has printed
+/// itself, and the next save runs again.
+struct Started {
+    ended: Receiver<Live>,
+    answer: Option<Live>,
+}
+
+impl Started {
+    /// Whether an answer is there, or none will come.
+    fn is_over(&mut self) -> bool {
+        if self.answer.is_none() {
+            match self.ended.try_recv() {
+                Ok(answer) => self.answer = Some(answer),
+                Err(TryRecvError::Empty) => return false,
+                Err(TryRecvError::Disconnected) => {}
+            }
+        }
+        true
+    }
+
+    /// Waits for the answer, not longer than `time`.
+    fn wait(&mut self, time: Duration) {
+        if self.answer.is_none() {
+            self.answer = self.ended.recv_timeout(time).ok();
+        }
     }
 }
 
@@ -247,28 +294,43 @@ struct Live {
     outcome: Result<(recipe::Outcome, Vec<PathBuf>)>,
 }
 
-fn once(args: &Args, path: &Path, runs: &Runs, task: &Task) -> Live {
-    let request = args.request();
-    let reads = vec![path.to_path_buf()];
-    let recipe = match recipes::find(&Disk, path) {
-        Ok(recipe) => recipe,
-        Err(error) => {
-            return Live {
-                reads,
-                outcome: Err(error),
-            };
+impl Job {
+    fn start(self: &Arc<Self>, task: &Task) -> Started {
+        let (answer, ended) = mpsc::channel();
+        let (job, task) = (Arc::clone(self), task.clone());
+        std::thread::spawn(move || {
+            // Nobody waits for the answer of a run that was dropped.
+            let _ = answer.send(job.once(&task));
+        });
+        Started {
+            ended,
+            answer: None,
         }
-    };
-    match runs.run(&recipe, &request, args.time_limit, task) {
-        Err(failure) => Live {
-            reads: failure.reads,
-            outcome: Err(failure.diagnostic),
-        },
-        Ok(outcome) => {
-            let written = runs.write(&outcome, args.output.as_deref(), &request, task);
-            Live {
-                reads: outcome.reads.clone(),
-                outcome: written.map(|written| (outcome, written)),
+    }
+
+    fn once(&self, task: &Task) -> Live {
+        let recipe = match recipes::find(&Disk, &self.path) {
+            Ok(recipe) => recipe,
+            Err(error) => {
+                return Live {
+                    reads: vec![self.path.clone()],
+                    outcome: Err(error),
+                };
+            }
+        };
+        let request = &self.request;
+        match self.runs.run(&recipe, request, self.time_limit, task) {
+            Err(failure) => Live {
+                reads: failure.reads,
+                outcome: Err(failure.diagnostic),
+            },
+            Ok(outcome) => {
+                let output = self.output.as_deref();
+                let written = self.runs.write(&outcome, output, request, task);
+                Live {
+                    reads: outcome.reads.clone(),
+                    outcome: written.map(|written| (outcome, written)),
+                }
             }
         }
     }
@@ -292,7 +354,12 @@ fn show(session: &Session, path: &Path, run: &Live) {
 }
 
 /// Waits until one of `files` changes; gives up, with false, once `ended` says so.
-fn changed(watch: &Watch, files: &[PathBuf], look: Duration, ended: impl Fn() -> bool) -> bool {
+fn changed(
+    watch: &Watch,
+    files: &[PathBuf],
+    look: Duration,
+    mut ended: impl FnMut() -> bool,
+) -> bool {
     let files: BTreeSet<PathBuf> = files.iter().map(|file| plain(file)).collect();
     loop {
         match watch.wait(look) {
