@@ -23,6 +23,8 @@ use crate::plot::{
 };
 use crate::view::{Camera, Renderer, Style, Surface, Wire};
 
+/// So many pixels in height show all signals, fewer without letters the most important ones.
+const ALL_SIGNALS: usize = 90;
 /// Opacity of the frames before and after.
 const SKIN: f32 = 0.22;
 /// How far away they are, in frames.
@@ -138,7 +140,7 @@ impl Brush {
                 let (scene, plane) = pose_space(&map, width, height, &theme);
                 picture(&scene, vec![plane], fine)
             }
-            Subject::Times(signals) if wish.text == 0.0 => {
+            Subject::Times(signals) if wish.text == 0.0 && wish.size.1 < ALL_SIGNALS => {
                 let (scene, planes) = chart(&coarse(&signals.0.times), width, height, &theme);
                 picture(&scene, planes, fine)
             }

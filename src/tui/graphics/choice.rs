@@ -9,8 +9,10 @@ const KITTY: &str = "\x1b_Gi=31,s=1,v=1,a=q,t=d,f=24;AAAA\x1b\\";
 const NAME: &str = "\x1b[>q";
 /// Asks for the pixels of a cell.
 const CELL: &str = "\x1b[16t";
-/// The background's colour, and how many colours sixel pictures may have.
-const COLOURS: &str = "\x1b]11;?\x1b\\\x1b[?1;1;0S";
+/// Asks for the background's colour.
+const BACKGROUND: &str = "\x1b]11;?\x1b\\";
+/// Asks how many colours sixel pictures may have.
+const REGISTERS_THERE: &str = "\x1b[?1;1;0S";
 /// What every terminal answers: its attributes. Asked last, so that nobody waits for those that are silent
 /// on the rest.
 const ATTRIBUTES: &str = "\x1b[c";
@@ -20,16 +22,17 @@ const PLACEHOLDERS: (u32, u32) = (0, 28);
 /// Sixel pictures of a terminal that does not count its registers: as a VT340 had them.
 const REGISTERS: u16 = 16;
 
-/// What the terminal is asked; through tmux what tmux does not know itself.
+/// What the terminal is asked; through tmux what tmux does not know itself, kitty pictures last: once they
+/// are answered all is.
 pub fn query(tmux: bool) -> String {
-    let outer = [KITTY, NAME, CELL].map(|question| {
+    let outer = [NAME, CELL, BACKGROUND, KITTY].map(|question| {
         if tmux {
             String::from_utf8_lossy(&through_tmux(question.as_bytes())).into_owned()
         } else {
             question.to_string()
         }
     });
-    outer.concat() + COLOURS + ATTRIBUTES
+    outer.concat() + REGISTERS_THERE + ATTRIBUTES
 }
 
 /// What a terminal answered.
