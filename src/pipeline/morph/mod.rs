@@ -343,6 +343,7 @@ mod tests {
                 method: MorphMethod::Spline,
                 frames: Some(9),
                 space: space.map(String::from),
+                ..MorphRequest::default()
             };
             let found = morph(&poses, &request, &Task::default()).unwrap().output;
             for (frame, pose) in [(0, 0), (4, 1), (8, 2)] {
