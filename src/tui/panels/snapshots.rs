@@ -60,7 +60,8 @@ fn studio_by(protocol: Protocol, size: (u16, u16), frames: usize) -> State {
     let bounds = Bounds::of_frames(&capture).unwrap().unwrap();
     let options = FitOptions {
         left_out: false,
-        ..FitOptions::default()
+        // What it finds does not change as the other method learns.
+        ..FitOptions::ch12()
     };
     let loom = fit(&capture, &options, &Task::default()).unwrap().output;
     let scene = Scene {
