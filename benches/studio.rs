@@ -16,7 +16,7 @@ const KEYS: usize = 40;
 /// What is asked of a terminal, at the end of the studio's questions, and an answer: cells of 10 x 20 pixels.
 const ASKED: &[u8] = b"\x1b[c";
 const ANSWER: &[u8] = b"\x1b[6;20;10t\x1b[?62c";
-/// A frame rate of 25 in a slow line's terms: bytes a second.
+/// Bytes a second of a slow line.
 const SLOW: usize = 256 * 1024;
 
 struct Studio {
@@ -135,7 +135,10 @@ impl Studio {
     }
 
     fn quit(mut self) {
-        self.press("\x1bq");
+        self.press("\x1b");
+        // Together they would be another key.
+        self.silence(SILENCE);
+        self.press("q");
         let _ = self.child.wait();
     }
 }
@@ -200,6 +203,8 @@ fn main() {
         report(&format!("a pin dragged, n = 204, {graphics}"), &moves);
         studio.press("\x1b");
         studio.silence(SILENCE);
+        // Small meshes behind the map are drawn last.
+        studio.silence(Duration::from_secs(1));
         let (busy, start) = (studio.busy(), Instant::now());
         let (_, bytes) = studio.silence(Duration::from_secs(4));
         let share = studio

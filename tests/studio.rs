@@ -343,6 +343,16 @@ impl Screen {
         self.press(&format!("\x1b[<0;{};{}m", b.0, b.1));
     }
 
+    /// Where the control point nearest to the cursor stands: it is taken in hand and put back.
+    fn last_control(&mut self) -> (u16, u16) {
+        self.press("d");
+        self.wait("◈");
+        let at = self.find("◈").unwrap();
+        self.press("\x1b");
+        self.wait_until("nothing in hand", |screen| !screen.contents().contains('◈'));
+        at
+    }
+
     fn signal(&self, signal: &str) {
         let id = self.child.process_id().unwrap().to_string();
         let kill = std::process::Command::new("kill")
@@ -370,13 +380,7 @@ fn a_control_point_dragged_is_a_line_and_dragged_again_the_same_line() {
     screen.wait("a loom of 12 frames");
     screen.press("G");
     screen.wait("frame 12.00/12");
-    screen.press("d");
-    screen.wait_until("a control point in hand", |screen| {
-        screen.contents().contains('◈')
-    });
-    let at = screen.find("◈").unwrap();
-    screen.press("\x1b");
-    screen.wait_until("nothing in hand", |screen| !screen.contents().contains('◈'));
+    let at = screen.last_control();
     let to = (at.0 - 4, at.1 + 2);
     screen.drag(at, to);
     let once = wait_for_text(&file, |text| text.contains(".move_control("));
@@ -388,7 +392,9 @@ fn a_control_point_dragged_is_a_line_and_dragged_again_the_same_line() {
     screen.wait_until("the run's end", |screen| {
         !screen.contents().contains("running")
     });
-    screen.drag(to, (to.0 - 3, to.1));
+    // The map has been drawn anew around the motion.
+    let at = screen.last_control();
+    screen.drag(at, (at.0 - 3, at.1));
     let twice = wait_for_text(&file, |text| text != once);
     assert_eq!(twice.matches(".move_control(").count(), 1, "{twice}");
     assert_eq!(twice.lines().count(), 3);

@@ -236,8 +236,11 @@ impl Files for Shown {
                 .err();
         }
         let loom = bench.load(path)?.loom.value;
-        let fps = spec.fps.or(loom.fps());
-        Ok(Warned::clean(Opened::Loom(Arc::new(loom.with_fps(fps)?))))
+        let loom = match spec.fps {
+            Some(fps) => Arc::new(loom.with_fps(Some(fps))?),
+            None => loom,
+        };
+        Ok(Warned::clean(Opened::Loom(loom)))
     }
 
     fn save(&self, name: &str, png: &[u8]) -> Result<PathBuf> {

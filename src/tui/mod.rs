@@ -6,6 +6,8 @@
 //!                                          panels draw State
 //! ```
 //!
+//! The hands ([`Desk`]) edit: a gesture is a line of the recipe, and what the recipe gives is shown.
+//!
 //! **Invariants:** `update` decides and draws nothing; panels draw and change nothing; work longer
 //! than a frame runs on worker threads, and answers to questions that are no longer asked are dropped.
 

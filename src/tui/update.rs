@@ -82,6 +82,10 @@ fn questions(state: &mut State) -> Vec<Command> {
 
 /// Small meshes for the map that is shown, unless they have been asked for.
 fn thumbs_question(state: &mut State) -> Option<Command> {
+    // What is in hand goes first: the small meshes follow when it is let go.
+    if state.hands.held.is_some() && state.thumbs.asked.is_some() {
+        return None;
+    }
     let wish = map::thumbs(state)?;
     if state.thumbs.asked.as_ref() == Some(&wish) {
         return None;

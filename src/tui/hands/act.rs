@@ -44,6 +44,8 @@ pub(in crate::tui) fn key(state: &mut State, key: KeyEvent) -> Option<Vec<Comman
     let chosen = &mut state.hands.page.chosen;
     match name.as_str() {
         "up" | "down" if params == 0 => scroll(state, if name == "up" { -1 } else { 1 }),
+        "k" => scroll(state, -1),
+        "j" => scroll(state, 1),
         _ if params == 0 => return None,
         "up" => *chosen = chosen.saturating_sub(1),
         "down" => *chosen = (*chosen + 1).min(params - 1),
@@ -82,7 +84,12 @@ fn held_key(state: &mut State, name: &str) -> Option<Vec<Command>> {
 fn other_held_key(state: &mut State, name: &str) -> Option<Vec<Command>> {
     let held = state.hands.held.clone()?;
     match (name, held) {
-        ("enter", _) => Some(drop(state)),
+        ("enter", held) => {
+            if matches!(held, Held::Sketch(..)) {
+                state.roaming = None;
+            }
+            Some(drop(state))
+        }
         ("esc", Held::Sketch(..)) => {
             state.roaming = None;
             cancel(state);
@@ -226,6 +233,10 @@ pub(super) fn gesture(state: &mut State, gesture: &Gesture) -> Vec<Command> {
     match write(state.hands.page.text(), gesture) {
         Ok(written) => {
             state.hands.page.touched = Some(written.line);
+            if !page_shown(state) {
+                let line = crate::recipe::text::line(&written.text, written.line);
+                say(state, format!("{}: {}", written.line, line.trim()), false);
+            }
             replace(state, written.text, true)
         }
         Err(error) => {
@@ -236,6 +247,11 @@ pub(super) fn gesture(state: &mut State, gesture: &Gesture) -> Vec<Command> {
             Vec::new()
         }
     }
+}
+
+/// Whether the recipe is on the screen: what it shows is not said again.
+pub(super) fn page_shown(state: &State) -> bool {
+    state.places().iter().any(|(panel, _)| *panel == RECIPE)
 }
 
 /// Another text of the recipe, that of before remembered, and a run of it.

@@ -17,8 +17,9 @@ use crate::tui::work::Picture;
 const REACH: f64 = 1.0;
 /// Frames this near are pinned, in cells.
 const PIN_REACH: f64 = 2.5;
-/// A control point goes before the curve unless the curve is nearer by this, in cells.
-const HEAD_START: f64 = 0.35;
+/// A control point goes before the curve unless the curve is nearer by this, in cells: in its own cell it
+/// always does.
+const HEAD_START: f64 = 0.75;
 /// Points of a sketch lie this far apart, in cells.
 const STRIDE: f64 = 2.5;
 

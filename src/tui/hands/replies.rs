@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::act::{changed_line, replace, run};
+use super::act::{changed_line, page_shown, replace, run};
 use super::held::{Held, cancel};
 use super::runner::Ran;
 use super::{Errand, Reply};
@@ -93,6 +93,7 @@ fn done(state: &mut State, ran: Result<Box<Ran>, Box<Diagnostic>>) {
             page.chosen = page.chosen.min(page.params.len().saturating_sub(1));
             state.hands.pinnable = ran.pinnable;
             if let Some(content) = ran.content {
+                let content = known(&state.content, content);
                 state.hands.good = Some(content.clone());
                 if state
                     .hands
@@ -106,12 +107,25 @@ fn done(state: &mut State, ran: Result<Box<Ran>, Box<Diagnostic>>) {
         }
         Err(error) if error.severity == Severity::Cancelled => {}
         Err(error) => {
+            if !page_shown(state) {
+                let line = error.place.line.map(|line| format!("line {line}: "));
+                let text = format!("{}{}", line.unwrap_or_default(), error.message);
+                say(state, text, true);
+            }
             state.hands.page.error = Some(error);
             state.hands.page.scroll = None;
             if let Some(good) = &state.hands.good {
                 state.content = good.clone();
             }
         }
+    }
+}
+
+/// What is shown already, if it is the same loom: its pictures stay.
+fn known(shown: &Content, content: Content) -> Content {
+    match (shown, &content) {
+        (Content::Loom(before, _), Content::Loom(now, _)) if before == now => shown.clone(),
+        _ => content,
     }
 }
 

@@ -353,9 +353,26 @@ fn the_panel_shows_the_error_at_its_line_at_any_size() {
     assert!(rows[3].trim().starts_with("no function"), "{rows:#?}");
     assert!(rows.iter().any(|row| row.contains("hint: did you mean")));
     assert!(rows[11].contains("●"), "{rows:#?}");
+    // A line too long is broken, and the caret stands below its part.
+    let rows = drawn(12, 20);
+    assert!(rows[1].starts_with("  1 fit(inpu"), "{rows:#?}");
+    assert!(rows[2].starts_with("        ^") && rows[3].starts_with("    t())"));
     for (width, height) in [(1, 1), (2, 3), (5, 2), (200, 60)] {
         drawn(width, height);
     }
+}
+
+#[test]
+fn a_small_screen_says_what_the_recipe_panel_would_show() {
+    let mut state = studio();
+    send(&mut state, Event::Resize(80, 24));
+    let commands = letter(&mut state, 'R');
+    assert_eq!(state.notice.as_ref().unwrap().text, "2: .reverse()");
+    let number = run_of(&commands).unwrap().number;
+    let error = Diagnostic::error("wrong").in_file("r.rhai").at_line(2);
+    tell(&mut state, Reply::Ran(number, Err(Box::new(error))));
+    let notice = state.notice.as_ref().unwrap();
+    assert!(notice.bad && notice.text == "line 2: wrong");
 }
 
 #[test]

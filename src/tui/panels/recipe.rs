@@ -86,45 +86,72 @@ struct Row {
     line: Line<'static>,
 }
 
-/// The text as rows: numbered lines, the error below its own.
+/// Columns before the text: the number of its line.
+const NUMBER: usize = 4;
+
+/// The text as rows: numbered lines, broken where they are too long, the error below its own.
 fn text(state: &State, page: &Page, width: usize) -> Vec<Row> {
-    let muted = state.look.style(Role::Muted);
+    let error = page.error.as_deref();
+    let at = error.and_then(|error| here(page, error));
     let mut rows = Vec::new();
+    // An error without a line of this text stands in front of it.
+    if let (Some(error), None) = (error, at) {
+        rows.extend(explained(state, error, 0, width));
+    }
     for (index, line) in page.text().lines().enumerate() {
         let of = index + 1;
-        let touched = page.touched == Some(of);
-        let number = if touched {
-            state.look.style(Role::Mark)
-        } else {
-            muted
-        };
-        let (code, comment) = split_comment(line);
-        let line = Line::from_iter([
-            Span::styled(
-                format!("{of:>3}{}", if touched { "▸" } else { " " }),
-                number,
-            ),
-            Span::raw(code.to_string()),
-            Span::styled(comment.to_string(), muted),
-        ]);
-        rows.push(Row { of, line });
-        if let Some(error) = page
-            .error
-            .as_deref()
-            .filter(|error| here(page, error) == Some(of))
-        {
+        let caret = (at == Some(of)).then(|| column(error, line, of));
+        rows.extend(broken(state, line, of, width, caret));
+        if let Some(error) = error.filter(|_| at == Some(of)) {
             rows.extend(explained(state, error, of, width));
         }
     }
-    // An error without a line of this text stands in front of it.
-    if let Some(error) = page
-        .error
-        .as_deref()
-        .filter(|error| here(page, error).is_none())
-    {
-        let mut all: Vec<Row> = explained(state, error, 0, width);
-        all.append(&mut rows);
-        return all;
+    rows
+}
+
+/// Where in its line an error is, from 0: what is missing behind the last line is missed at its end.
+fn column(error: Option<&Diagnostic>, line: &str, of: usize) -> usize {
+    let place = error.map(|error| &error.place);
+    match place {
+        Some(place) if place.line == Some(of) => place.column.unwrap_or(1).saturating_sub(1),
+        _ => line.chars().count(),
+    }
+}
+
+/// A line of the recipe in rows, with a caret below one of its columns.
+fn broken(state: &State, line: &str, of: usize, width: usize, caret: Option<usize>) -> Vec<Row> {
+    let muted = state.look.style(Role::Muted);
+    let touched = state.hands.page.touched == Some(of);
+    let (mark, style) = if touched {
+        ("▸", state.look.style(Role::Mark))
+    } else {
+        (" ", muted)
+    };
+    let code = split_comment(line).0.chars().count();
+    let letters: Vec<char> = line.chars().collect();
+    let room = width.saturating_sub(NUMBER).max(1);
+    let parts = letters.len().max(1).div_ceil(room);
+    let mut rows = Vec::new();
+    for part in 0..parts {
+        let range = part * room..((part + 1) * room).min(letters.len());
+        let split = code.clamp(range.start, range.end);
+        let number = if part == 0 {
+            format!("{of:>3}{mark}")
+        } else {
+            " ".repeat(NUMBER)
+        };
+        let line = Line::from_iter([
+            Span::styled(number, style),
+            Span::raw(String::from_iter(&letters[range.start..split])),
+            Span::styled(String::from_iter(&letters[split..range.end]), muted),
+        ]);
+        rows.push(Row { of, line });
+        let below = caret.filter(|at| at / room == part || (part + 1 == parts && at / room > part));
+        if let Some(at) = below {
+            let caret = format!("{}^", " ".repeat(NUMBER + at - range.start));
+            let line = Line::styled(caret, state.look.style(Role::Bad));
+            rows.push(Row { of, line });
+        }
     }
     rows
 }
@@ -142,18 +169,10 @@ fn here(page: &Page, error: &Diagnostic) -> Option<usize> {
     line.filter(|&line| own && line > 0)
 }
 
-/// The caret, the message and its hints.
+/// The message and its hints.
 fn explained(state: &State, error: &Diagnostic, of: usize, width: usize) -> Vec<Row> {
-    let page = &state.hands.page;
     let bad = state.look.style(Role::Bad);
     let mut lines = Vec::new();
-    if of > 0 {
-        let column = match page.text().lines().nth(of - 1) {
-            Some(line) if error.place.line > Some(of) => line.chars().count() + 1,
-            _ => error.place.column.unwrap_or(1),
-        };
-        lines.push((format!("{}^", " ".repeat(3 + column)), bad));
-    }
     let mut message = error.message.clone();
     if of == 0
         && let Some(file) = &error.place.file

@@ -6,9 +6,11 @@ use super::tests::{press, screen, send, studio_of};
 use crate::loom::fit::{FitOptions, fit};
 use crate::mesh::{Bounds, Sequence, Topology};
 use crate::pipeline::plot::plot_loom;
+use crate::recipe::Recipe;
 use crate::task::Task;
 use crate::tui::event::{Answer, Event};
 use crate::tui::graphics::{CellSize, Protocol};
+use crate::tui::hands::Reply;
 use crate::tui::state::{Content, Same, Scene, Signals, State};
 
 /// Frames of the bar's swing.
@@ -77,6 +79,12 @@ fn studio_by(protocol: Protocol, size: (u16, u16), frames: usize) -> State {
     };
     let content = Content::Loom(scene, Same::new(Signals { map, times }));
     send(&mut state, opened(content));
+    let recipe = Recipe {
+        path: "bar.rhai".into(),
+        text: "// to and fro\nfit(input())\n".into(),
+    };
+    let found = Reply::Found(recipe, false, None);
+    send(&mut state, Event::Answer(Answer::Hands(found)));
     state
 }
 
@@ -98,7 +106,7 @@ fn a_small_screen_has_tabs() {
 }
 
 #[test]
-fn a_usual_screen_has_three_panels() {
+fn a_usual_screen_has_four_panels() {
     let mut state = studio((120, 36), FRAMES);
     keys(&mut state, "[");
     for _ in 0..5 {
@@ -135,8 +143,9 @@ fn the_cursor_off_the_curve_and_a_closer_look() {
 fn before_and_after_stand_side_by_side() {
     let mut state = studio((80, 24), FRAMES);
     keys(&mut state, "b");
-    press(&mut state, KeyCode::BackTab);
-    press(&mut state, KeyCode::BackTab);
+    for _ in 0..3 {
+        press(&mut state, KeyCode::BackTab);
+    }
     insta::assert_snapshot!("before_80x24", letters(&state));
 }
 
