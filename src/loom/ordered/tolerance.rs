@@ -26,8 +26,9 @@ const CUT: f64 = 1.05;
 /// The left-out error may be so many times that of a cubic spline in every coordinate.
 const LEFT_OUT: f64 = 1.08;
 
-/// Control points that are tried, in tenths of the frames, most first; the first is the usual number.
-const TENTHS: [usize; 4] = [8, 6, 4, 3];
+/// Control points that are tried, in tenths of the frames, most first; the first is the usual number. With
+/// still fewer the motion may be met, but its curve leaves the layout: poses that return lie apart.
+const TENTHS: [usize; 3] = [8, 6, 4];
 
 /// Fits with what is given, and as few of the rest as the tolerance allows; full fidelity where nothing
 /// keeps it. With `between`, as few as left-out frames allow, too.
