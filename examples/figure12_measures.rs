@@ -32,7 +32,7 @@ struct Measured {
 
 fn draw(figure: &mut Figure) -> Result<()> {
     let (topology, straight) = rojas::arm(0.0, 0.0, 0.0);
-    let (_, bent) = rojas::arm(2.1, 1.0, 0.6);
+    let (_, bent) = rojas::arm(1.7, 0.6, 0.4);
     let embedding = Embedding::new(&topology).map_err(SpaceError::from)?;
     let keys = KeyShapes::new(&embedding, &[&bent, &straight]);
     let path: Vec<f64> = (0..=STEPS).map(|i| i as f64 / STEPS as f64).collect();

@@ -156,7 +156,7 @@ fn three(
     lines: &mut Vec<Vec<String>>,
 ) -> Result<()> {
     let (topology, straight) = rojas::arm(0.0, 0.0, 0.0);
-    let (_, bent) = rojas::arm(2.1, 1.0, 0.6);
+    let (_, bent) = rojas::arm(1.7, 0.6, 0.4);
     let weights: Vec<Vec<f64>> = (0..6)
         .map(|i| f64::from(i) / 5.0)
         .map(|t| vec![1.0 - t, t])
@@ -201,8 +201,8 @@ fn paths(
     let poses = [
         rojas::arm(0.0, 0.0, 0.0).1,
         rojas::arm(1.7, 0.0, 0.0).1,
-        rojas::arm(0.2, 1.0, 1.2).1,
-        rojas::arm(1.7, 1.0, 1.2).1,
+        rojas::arm(0.2, 0.6, 0.4).1,
+        rojas::arm(1.7, 0.6, 0.4).1,
     ];
     let view = view(&topology, &poses.each_ref().map(Vec::as_slice), [0.0, 0.15]);
     let given: Vec<_> = poses

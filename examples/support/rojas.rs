@@ -40,7 +40,8 @@ fn tube(rings: usize, around: usize, place: impl Fn(f64, f64, f64) -> [f64; 3]) 
 }
 
 /// An arm of 2,502 vertices along x, of length 4, its elbow at 0 bent by `bend` radians, a muscle swollen
-/// by `flex` above it, the wrist turned by `twist`. The bend is spread over a length of 1, as skin does.
+/// by `flex` above it, the wrist turned by `twist`. The bend is spread over a length of 1.6, as skin
+/// does.
 pub(crate) fn arm(bend: f64, flex: f64, twist: f64) -> Mesh {
     tube(100, 25, |along, angle, inside| {
         let x = 4.0 * along - 2.0;
@@ -56,11 +57,11 @@ pub(crate) fn arm(bend: f64, flex: f64, twist: f64) -> Mesh {
     })
 }
 
-/// A point of a straight body about the x axis after a bend by `angle` towards +y over -1/2 < x < 1/2.
+/// A point of a straight body about the x axis after a bend by `angle` towards +y over -0.8 < x < 0.8.
 fn bent(x: f64, y: f64, z: f64, angle: f64) -> [f64; 3] {
     // the axis: heading angle * s(x) with a smooth s; positions by the midpoint rule
     let heading = |x: f64| {
-        let t = (x + 0.5).clamp(0.0, 1.0);
+        let t = ((x + 0.8) / 1.6).clamp(0.0, 1.0);
         angle * t * t * (3.0 - 2.0 * t)
     };
     let steps = 64;

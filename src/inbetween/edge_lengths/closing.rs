@@ -24,7 +24,7 @@ const IDLE: usize = 3;
 const GAIN: f64 = 0.25;
 
 /// Damping, in parts of the mean diagonal: at the start and at most.
-const DAMPING: [f64; 2] = [1e-3, 1e4];
+const DAMPING: [f64; 2] = [1e-2, 1e4];
 
 /// What the iteration did.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -137,7 +137,7 @@ impl Closer {
             let gain = (done.after - energy) / done.after;
             dihedrals.copy_from_slice(&trial);
             (errors, done.after) = (found, energy);
-            damping = (damping * if refused { 0.5 } else { 0.1 }).max(1e-12);
+            damping = (damping * if refused { 1.0 } else { 0.1 }).max(1e-12);
             refused = false;
             idle = if gain < GAIN { idle + 1 } else { 0 };
             if idle == IDLE {

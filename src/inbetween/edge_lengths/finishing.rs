@@ -14,7 +14,7 @@ use crate::math::block_sparse::BlockPattern;
 use crate::math::sparse::Factor;
 
 /// Steps at most; lengths of a real shape need two or three.
-const STEPS: usize = 24;
+const STEPS: usize = 20;
 
 /// Edges shorter than this part of the mean count as this long where errors are divided by lengths.
 const SHORT: f64 = 1e-3;
