@@ -15,13 +15,13 @@ use crate::math::sparse::Factor;
 /// Steps at most; a blend of poses needs four to eight.
 const STEPS: usize = 24;
 
-/// Walks are closed below this energy a walk: the rounding of a product of some ten rotations, squared.
-const CLOSED: f64 = 1e-28;
+/// Walks are closed below this energy a walk, a millionth of a radian each: the finishing solve takes over.
+const CLOSED: f64 = 1e-12;
 
 /// This many steps in a row that each gain less than this part of the energy end the iteration: where
 /// walks close it shrinks by orders of magnitude a step, where they cannot the finishing solve does better.
 const IDLE: usize = 3;
-const GAIN: f64 = 0.25;
+const GAIN: f64 = 0.5;
 
 /// Damping, in parts of the mean diagonal: at the start and at most.
 const DAMPING: [f64; 2] = [1e-2, 1e4];

@@ -19,8 +19,8 @@ const STEPS: usize = 20;
 /// Edges shorter than this part of the mean count as this long where errors are divided by lengths.
 const SHORT: f64 = 1e-3;
 
-/// Met to this relative error (root mean square): rounding of positions about ten edges apart.
-const MET: f64 = 1e-13;
+/// Met to this relative error (root mean square), a hundredth of what is asked of the worst edge.
+const MET: f64 = 1e-6;
 
 /// This many steps in a row that each gain less than this part of what is left end the iteration.
 const IDLE: usize = 3;

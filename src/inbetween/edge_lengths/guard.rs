@@ -398,7 +398,7 @@ mod tests {
             for &frame in &popped {
                 frames[frame] = case.popped(frame);
                 // the same lengths, another shape
-                assert!(frames[frame].report.edges.max_percent() < 1e-6);
+                assert!(frames[frame].report.edges.max_percent() < 0.01);
                 let change = difference(&frames[frame].dihedrals, &case.frames[frame].dihedrals);
                 assert!(change.change.abs() > 1.0);
             }
@@ -414,7 +414,7 @@ mod tests {
                 "{ends:?}"
             );
             for (found, wanted) in frames.iter().zip(&case.frames) {
-                assert!(difference(&found.dihedrals, &wanted.dihedrals).change.abs() < 1e-6);
+                assert!(difference(&found.dihedrals, &wanted.dihedrals).change.abs() < 1e-2);
             }
         }
     }
