@@ -12,6 +12,8 @@ const SPIKE: f64 = 1.6;
 /// in them.
 const OF_FLOOR: f64 = 0.4;
 const OF_LINEAR: f64 = 0.2;
+/// What is below this part of a frame step in root mean square is not seen.
+const UNSEEN: f64 = 0.01;
 
 /// What a trial may be worse by than a good fit: refinement halves most errors, but seldom the worst.
 const TRIAL: f64 = 3.0;
@@ -54,7 +56,10 @@ impl Quality {
         let linear = OF_LINEAR * samples.linear / samples.spread;
         let spiked = between > (SPIKE * at_samples).max(linear)
             || worst > VISIBLE && worst > 2.0 * SPIKE * worst_at;
-        let lost = linear.max(OF_FLOOR * floor);
+        let steps = samples.step * (samples.finer.nrows() as f64).sqrt();
+        let lost = linear
+            .max(OF_FLOOR * floor)
+            .max(UNSEEN * steps / samples.spread);
         Quality {
             at_samples,
             at_frames,

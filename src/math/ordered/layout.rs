@@ -28,6 +28,8 @@ const HALFWAY: f64 = 0.5;
 const WORSE: f64 = 1.5;
 /// .. or up to so many times what the modes leave out.
 const FLOORS: f64 = 0.75;
+/// .. or up to so many steps between frames in root mean square: refinement makes that invisible.
+const STEPS: f64 = 0.05;
 /// So many candidates are worth refining.
 const CANDIDATES: usize = 6;
 /// Softening of the weights, of the largest distance.
@@ -157,7 +159,8 @@ pub(super) fn candidates(
 ) -> Result<Vec<Candidate>, Cancelled> {
     let scale = Scale::new(samples);
     let mut unrolled = unrolled(order, &scale, task)?;
-    let tolerated = FLOORS * floor * samples.spread;
+    let tolerated = (FLOORS * floor * samples.spread)
+        .max(STEPS * samples.step * (samples.finer.nrows() as f64).sqrt());
     let least = unrolled
         .iter()
         .map(|one| one.score)
