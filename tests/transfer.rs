@@ -216,6 +216,34 @@ fn time_stays_and_an_edit_before_or_after_is_the_same() {
 }
 
 #[test]
+fn a_motion_beyond_a_half_turn_reaches_its_examples() {
+    let (source, points) = tube(24, 8, 0.4);
+    let (target, others) = tube(19, 10, 0.3);
+    // the ends of the tube turn by 4 radians each: branches drawn from frame to frame are not principal
+    let bends = [0.0, 4.0, 8.0];
+    let poses = |topology: &Arc<Topology>, points: &[f64]| {
+        sequence(topology, &bends.map(|bend| posed(points, bend, 0.0)))
+    };
+    let examples = Examples::new(poses(&source, &points), poses(&target, &others)).unwrap();
+    let frames: Vec<Vec<f64>> = (0..9).map(|i| posed(&points, f64::from(i), 0.0)).collect();
+    for space in SPACES {
+        let loom = exact(&sequence(&source, &frames), space.name);
+        let found = transfer(&loom, &examples, &Task::default()).unwrap().output;
+        for (frame, example) in [(0, 0), (4, 1), (8, 2)] {
+            let shape = found.loom.at((frame + 1) as f64).unwrap();
+            let error = farthest(&shape, &posed_f32(&others, bends[example]));
+            assert!(error < ROUNDING, "{}, frame {frame}: {error}", space.name);
+            assert!(found.coverage[frame] < 1e-5, "{}", space.name);
+        }
+    }
+}
+
+fn posed_f32(points: &[f64], bend: f64) -> Vec<f32> {
+    let pose = posed(points, bend, 0.0);
+    pose.into_iter().map(|x| x as f32).collect()
+}
+
+#[test]
 fn a_loaded_loom_is_transferred_like_the_fitted_one() {
     let (topology, points) = tube(12, 8, 0.4);
     let (target, others) = tube(9, 10, 0.7);

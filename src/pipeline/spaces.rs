@@ -20,6 +20,9 @@ const FEWEST: usize = 5;
 /// Frames that show an adapting space what it has to hold.
 const SAMPLES: usize = 16;
 
+/// Above this error between frames nothing is known of them: the mean pose would do as well.
+const NO_MOTION: f64 = 1.0;
+
 /// How one space does. Errors are at the left-out frames, relative:
 /// sqrt(sum |v - w|^2) / sqrt(sum |v - mean|^2) over vertex positions.
 #[derive(Debug, Clone, PartialEq)]
@@ -96,11 +99,28 @@ pub fn best_space(reports: &[SpaceReport]) -> Option<&SpaceReport> {
     near.min_by_key(|report| report.numbers)
 }
 
+/// An error with three digits.
+fn percent(error: f64) -> String {
+    let percent = 100.0 * error;
+    let digits = match percent {
+        p if p >= 100.0 => 0,
+        p if p >= 10.0 => 1,
+        p if p >= 1.0 => 2,
+        _ => 3,
+    };
+    format!("{percent:.digits$} %")
+}
+
 /// Why [`best_space`] suits the capture, and what speaks against it, in sentences; none without reports.
 pub fn why(reports: &[SpaceReport]) -> Option<String> {
     let best = best_space(reports)?;
-    let percent = |error: f64| format!("{:.3} %", 100.0 * error);
     let least = reports.iter().min_by(|a, b| a.psi.total_cmp(&b.psi))?;
+    if least.psi > NO_MOTION {
+        return Some(format!(
+            "no space tells the frames between ({} off at best): these are poses rather than a motion, or far too few frames of one",
+            percent(least.psi)
+        ));
+    }
     let times = |numbers: usize| numbers as f64 / best.numbers.max(1) as f64;
     let mut text = match least.name == best.name {
         true => format!("no space errs less between frames ({})", percent(best.psi)),
@@ -277,7 +297,7 @@ mod tests {
         assert_eq!(best_space(&found).unwrap().name, "vertices");
         let text = why(&found).unwrap();
         assert!(
-            text.contains("gradients by 1.000 % but with 3.0 times its numbers"),
+            text.contains("gradients by 1.00 % but with 3.0 times its numbers"),
             "{text}"
         );
         assert!(text.contains("where gradients guess"), "{text}");
@@ -293,9 +313,11 @@ mod tests {
         let text = why(&found).unwrap();
         assert!(text.contains("no space errs less"), "{text}");
         assert!(
-            text.contains("vertices, which shrink what turns, err by 4.000 %"),
+            text.contains("vertices, which shrink what turns, err by 4.00 %"),
             "{text}"
         );
         assert!(why(&[]).is_none() && best_space(&[]).is_none());
+        let poses = why(&[report("vertices", 1.4, 100, 0)]).unwrap();
+        assert!(poses.contains("140 % off at best"), "{poses}");
     }
 }
