@@ -272,7 +272,7 @@ fn compose(bells: &Sequence, faces: &Transferred, view: &View, map: Scene) -> Sc
     let theme = Theme::light();
     let side = 0.5 * SIDE as f32;
     let row = side + 34.0;
-    let mut scene = Scene::new(map.width, 2.0 * row + map.height, theme.background);
+    let mut scene = Scene::new(map.width, 2.0 * row + 26.0 + map.height, theme.background);
     let bell_view = View::looking(bells, [0.0, 0.2]);
     let told = ["long, round", "short, round", "long, flat", "short, flat"];
     let picture = |i: usize| bell_view.picture(bells.frame(i), SIDE, COLOURS[1]);
@@ -314,6 +314,6 @@ fn compose(bells: &Sequence, faces: &Transferred, view: &View, map: Scene) -> Sc
         Anchor::Start,
         &theme,
     );
-    scene.place(map, [0.0, 2.0 * row + 8.0]);
+    scene.place(map, [0.0, 2.0 * row + 26.0]);
     scene
 }
