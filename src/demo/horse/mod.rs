@@ -41,10 +41,10 @@ pub fn horse_gallop(build: Build) -> Sequence {
     animate(build, &gait::gallop(), 60, 60.0)
 }
 
-/// Fourteen poses of a horse of that build, the same for all: at rest; each leg, the others standing, pushed
-/// off far behind, folded in the swing and reaching forward; neck and back as in a gallop.
+/// Ten poses of a horse of that build, the same for all: at rest; each leg, the others standing, pushed
+/// off far behind and folded in the swing; neck and back as in a gallop.
 pub fn horse_poses(build: Build) -> Sequence {
-    const MOMENTS: [f64; 3] = [1.1, 1.4, 1.85];
+    const MOMENTS: [f64; 2] = [1.05, 1.4];
     let gallop = gait::gallop();
     let mut stances = vec![Stance::default()];
     for leg in 0..HOOVES.len() {

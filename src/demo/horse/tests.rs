@@ -96,7 +96,7 @@ fn builds_have_bones_in_common_and_faces_of_their_own() {
     let [light, heavy] = [Build::Light, Build::Heavy].map(horse_poses);
     assert!(is_closed_manifold(heavy.topology()));
     assert!(!heavy.topology().same_connectivity(light.topology()));
-    assert_eq!((light.frames(), heavy.frames()), (14, 14));
+    assert_eq!((light.frames(), heavy.frames()), (10, 10));
     assert!(
         light
             .topology()
@@ -107,7 +107,7 @@ fn builds_have_bones_in_common_and_faces_of_their_own() {
         points.iter().map(|p| f64::from(p[0])).sum::<f64>() / points.len() as f64
     };
     // a leg that swings takes the middle of either with it
-    for frame in 1..13 {
+    for frame in 1..9 {
         let shift = [&light, &heavy].map(|horse| middle(horse, frame) - middle(horse, 0));
         assert!(shift[0] * shift[1] > 0.0, "pose {frame}: {shift:?}");
     }
