@@ -157,7 +157,8 @@ fn strides_lie_on_each_other() {
     }
 }
 
-/// Two strides of `stride` frames, the same poses: a fit of few sites may part them by what nobody sees.
+/// Two strides of `stride` frames, the same poses: a fit of few sites may part their ends by a tenth of the
+/// map, which is less than frames that follow each other are apart.
 fn assert_overlaid(fitted: &Fitted, stride: usize) {
     let places = &fitted.signals.layout.positions;
     let size = places
@@ -167,7 +168,7 @@ fn assert_overlaid(fitted: &Fitted, stride: usize) {
     for i in 0..stride {
         let (one, two) = (places[i], places[i + stride]);
         let apart = (one[0] - two[0]).hypot(one[1] - two[1]);
-        assert!(apart < 0.05 * size, "frame {i}: {apart} of {size}");
+        assert!(apart < 0.1 * size, "frame {i}: {apart} of {size}");
     }
 }
 
