@@ -141,7 +141,7 @@ actions! {
     Onion ["o"] "onion skin: the frames before and after",
     Thumbs ["m"] "small meshes behind the map",
     Errors ["E"] "the mesh by its distance from the capture, as colour",
-    Before ["b"] "the capture, or the loom as it was opened, beside the mesh",
+    Before ["b"] "the capture, or the loom as opened, beside the mesh",
     SavePicture ["P"] "the panel to a PNG file",
     Export ["x"] "the frames between the marks (or all) to files",
     Help ["?"] "these keys",

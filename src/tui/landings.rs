@@ -130,7 +130,7 @@ fn follow(
             bytes.extend_from_slice(b"\x1b[0m\x1b[2J");
             shown = Buffer::empty(next.area);
         }
-        bytes.extend(write_cells(&shown.diff(&next)));
+        bytes.extend(write_cells(&shown.diff(&next), columns));
         if !bytes.is_empty() {
             terminal::send(&bytes).map_err(lost)?;
         }

@@ -325,7 +325,7 @@ impl Studio {
             return Ok(());
         }
         bytes.extend(aside.before);
-        bytes.extend(write_cells(&changes));
+        bytes.extend(write_cells(&changes, self.shown.area.width));
         (self.shown, self.stale) = (next, false);
         terminal::send(&bytes).map_err(lost)
     }

@@ -45,9 +45,9 @@ const PLAIN: Pen = Pen {
     modifier: Modifier::empty(),
 };
 
-/// The bytes that write these cells (column, row, cell), in rows from left to right, and leave the
-/// terminal's colours as they were.
-pub(super) fn write_cells(changes: &[(u16, u16, &Cell)]) -> Vec<u8> {
+/// The bytes that write these cells (column, row, cell) of a terminal of `width` columns, in rows from
+/// left to right, and leave the terminal's colours as they were.
+pub(super) fn write_cells(changes: &[(u16, u16, &Cell)], width: u16) -> Vec<u8> {
     let (mut text, mut pen, mut next) = (String::new(), PLAIN, None);
     for &(column, row, cell) in changes {
         move_to(&mut text, next, (column, row));
@@ -55,8 +55,9 @@ pub(super) fn write_cells(changes: &[(u16, u16, &Cell)]) -> Vec<u8> {
         change(&mut text, pen, wanted);
         pen = wanted;
         text.push_str(symbol);
-        // The place after a letter that may be wide is not relied on.
-        next = is_narrow(cell.symbol()).then_some((column + 1, row));
+        // The place after a letter that may be wide, or after a row's last, is not relied on.
+        let sure = is_narrow(cell.symbol()) && column + 1 < width;
+        next = sure.then_some((column + 1, row));
     }
     if pen != PLAIN {
         text.push_str("\x1b[m");
@@ -64,15 +65,29 @@ pub(super) fn write_cells(changes: &[(u16, u16, &Cell)]) -> Vec<u8> {
     text.into_bytes()
 }
 
-fn move_to(text: &mut String, from: Option<(u16, u16)>, (column, row): (u16, u16)) {
-    let shift = from.filter(|at| at.1 == row && at.0 <= column);
-    // Writing to a string does not fail.
-    let _ = match shift.map(|at| column - at.0) {
-        Some(0) => Ok(()),
-        Some(1) => text.write_str("\x1b[C"),
-        Some(by) => write!(text, "\x1b[{by}C"),
-        None => write!(text, "\x1b[{};{}H", row + 1, column + 1),
+fn move_to(text: &mut String, from: Option<(u16, u16)>, to: (u16, u16)) {
+    let absolute = format!("\x1b[{};{}H", to.1 + 1, to.0 + 1);
+    let steps = from.and_then(|from| relative(from, to));
+    text.push_str(
+        &steps
+            .filter(|steps| steps.len() < absolute.len())
+            .unwrap_or(absolute),
+    );
+}
+
+/// The way along a row, or to the row below.
+fn relative(from: (u16, u16), to: (u16, u16)) -> Option<String> {
+    let down = match to.1.checked_sub(from.1)? {
+        0 => "",
+        1 => "\x1b[B",
+        _ => return None,
     };
+    let aside = if to.0 < from.0 { 'D' } else { 'C' };
+    Some(match to.0.abs_diff(from.0) {
+        0 => down.to_string(),
+        1 => format!("{down}\x1b[{aside}"),
+        by => format!("{down}\x1b[{by}{aside}"),
+    })
 }
 
 /// ASCII, boxes, blocks and braille.
@@ -206,7 +221,7 @@ mod tests {
     }
 
     fn sent(buffer: &Buffer) -> Vec<u8> {
-        write_cells(&Buffer::empty(buffer.area).diff(buffer))
+        write_cells(&Buffer::empty(buffer.area).diff(buffer), buffer.area.width)
     }
 
     fn seen(cell: &vt100::Cell) -> (String, vt100::Color, vt100::Color) {
@@ -268,6 +283,25 @@ mod tests {
     }
 
     #[test]
+    fn columns_are_written_downwards_and_edges_are_not_left_behind() {
+        let mut buffer = Buffer::empty(Rect::new(0, 0, 40, 6));
+        for row in 0..6 {
+            buffer[(20, row)].set_symbol("│");
+            buffer[(23, row)].set_symbol("┃");
+            buffer[(39, row)].set_symbol("x");
+        }
+        let rows = vec![format!("{:20}│  ┃{:15}x", "", ""); 6];
+        assert_eq!(
+            terminal(&sent(&buffer)).screen().contents(),
+            rows.join("\n")
+        );
+        let two: Vec<(u16, u16, &Cell)> = [(20, 0), (20, 1)]
+            .map(|(column, row)| (column, row, &buffer[(column, row)]))
+            .to_vec();
+        assert_eq!(write_cells(&two, 40), "\x1b[1;21H│\x1b[B\x1b[D│".as_bytes());
+    }
+
+    #[test]
     fn text_arrives_with_its_style_and_its_place() {
         let mut buffer = Buffer::empty(Rect::new(0, 0, 40, 6));
         let bold = Style::new()
@@ -291,6 +325,6 @@ mod tests {
 
     #[test]
     fn nothing_is_nothing() {
-        assert!(write_cells(&[]).is_empty());
+        assert!(write_cells(&[], 80).is_empty());
     }
 }

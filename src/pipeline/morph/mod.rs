@@ -260,6 +260,9 @@ fn only_edge_lengths(request: &MorphRequest) -> Result<()> {
             "`{name}` is for the method edge-lengths, not for {}",
             request.method.name()
         ))
+        .hint(
+            "say `--method edge-lengths` (in a recipe `method: \"edge-lengths\"`), or leave it out",
+        )
         .err(),
     }
 }
