@@ -45,9 +45,30 @@ const PLAIN: Pen = Pen {
     modifier: Modifier::empty(),
 };
 
+/// Up to this many changed cells both orders are tried.
+const FEW: usize = 1000;
+
 /// The bytes that write these cells (column, row, cell) of a terminal of `width` columns, in rows from
-/// left to right, and leave the terminal's colours as they were.
+/// left to right, and leave the terminal's colours as they were. A few cells are written in columns
+/// where that is shorter: a cursor that moved is two columns of one colour each.
 pub(super) fn write_cells(changes: &[(u16, u16, &Cell)], width: u16) -> Vec<u8> {
+    let rows = written(changes, width);
+    // The half of a wide letter is written over from the left only.
+    if changes.len() > FEW || !changes.iter().all(|change| is_narrow(change.2.symbol())) {
+        return rows;
+    }
+    let mut downwards = changes.to_vec();
+    downwards.sort_by_key(|&(column, row, _)| (column, row));
+    let columns = written(&downwards, width);
+    if columns.len() < rows.len() {
+        columns
+    } else {
+        rows
+    }
+}
+
+/// The same in the order given.
+fn written(changes: &[(u16, u16, &Cell)], width: u16) -> Vec<u8> {
     let (mut text, mut pen, mut next) = (String::new(), PLAIN, None);
     for &(column, row, cell) in changes {
         move_to(&mut text, next, (column, row));

@@ -68,7 +68,7 @@ pub struct GhostOptions {
     /// How the mesh follows.
     pub lift: Lift,
     /// Whether what is missing at the keys is kept; without it keys are met but for the detail that the
-    /// ghost cannot carry. Without it X19's way, but for the screening towards the direct lift.
+    /// ghost cannot carry (X19's own way, but for the screening towards the direct lift).
     pub residual: bool,
 }
 
