@@ -1,6 +1,6 @@
 //! Key poses to motion: what lies between a few shapes of one mesh, or between skeletons.
 //!
-//! [`complete`] runs splines through the keys' coordinates in a shape space (X19); [`isometric`],
+//! [`mod@complete`] runs splines through the keys' coordinates in a shape space (X19); [`isometric`],
 //! [`polygon`] and [`skeleton`] keep lengths (IM). [`edge_lengths`] interpolates lengths and finds the shapes
 //! that have them (R14); [`conformal`] gives such lengths by one factor a vertex.
 

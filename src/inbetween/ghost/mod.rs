@@ -3,9 +3,9 @@
 //!
 //! One sequence of half-edge collapses serves all keys ([`crate::mesh::collapse`]), so the ghost's
 //! vertices are vertices of the mesh. How the ghost's triangles around each of its vertices have turned
-//! and stretched since the first key ([`turns`]) is carried to the mesh ([`carrier`]): to its vertices
-//! ([`direct`]) and, unless that is to be all, to its triangles, whose gradients are then integrated
-//! ([`gradients`], deformation transfer). What is missing at the keys is kept in the carried frames and blended by the
+//! and stretched since the first key (`turns`) is carried to the mesh (`carrier`): to its vertices
+//! (`direct`) and, unless that is to be all, to its triangles, whose gradients are then integrated
+//! (`gradients`, deformation transfer). What is missing at the keys is kept in the carried frames and blended by the
 //! spline's cardinal weights, so keys are reproduced.
 
 mod carrier;
