@@ -19,6 +19,7 @@ use crate::math::b_spline::{Curve, Inserted, Place, Point};
 use crate::math::curve_join::join;
 use crate::math::monotone;
 use crate::math::rotation;
+use crate::signal::pose::PoseSignal;
 use crate::signal::root::{RootFrame, RootSignal};
 use crate::signal::time::TimeSignal;
 
@@ -82,16 +83,22 @@ pub fn add_loop(
             .saturating_add(wanted)
             .saturating_mul(times),
     )?;
-    let mut best = attempt(&forward.loom, (from, to), times, wanted)?;
-    // A seam that shows is given more time.
+    let mut best = attempt(&forward.loom, (from, to), times, (wanted, bridge::ease))?;
+    // A seam that shows is evened out, then given more time.
     let longest = most_bridged(length as usize);
     let mut next = wanted;
+    if best.seam.worst() > SHOWS {
+        let evened = attempt(&forward.loom, (from, to), times, (wanted, bridge::even))?;
+        if evened.seam.worst() < best.seam.worst() {
+            best = evened;
+        }
+    }
     while bridge.is_none() && wanted > 0 && best.seam.worst() > SHOWS {
         next = (5 * next).div_ceil(4).max(next + 1);
         if next > longest {
             break;
         }
-        let longer = attempt(&forward.loom, (from, to), times, next)?;
+        let longer = attempt(&forward.loom, (from, to), times, (next, bridge::even))?;
         if longer.seam.worst() < best.seam.worst() {
             best = longer;
         }
@@ -112,10 +119,18 @@ fn most_bridged(frames: usize) -> usize {
     5 * frames.max(24) / 2
 }
 
+/// How the way over a seam is found: [`bridge::ease`] or [`bridge::even`].
+type Ease = fn(&PoseSignal, &Curve, &[Place], usize, usize) -> Curve;
+
 /// The loop with that many frames between passes, on a loom without changes of time.
-fn attempt(loom: &Loom, stretch: (f64, f64), times: usize, bridge: usize) -> Result<Looped> {
+fn attempt(
+    loom: &Loom,
+    stretch: (f64, f64),
+    times: usize,
+    (bridge, ease): (usize, Ease),
+) -> Result<Looped> {
     let (from, to) = stretch;
-    let plan = Plan::new(loom, from, to, bridge)?;
+    let plan = Plan::new(loom, from, to, bridge, ease)?;
     let looped = plan.repeat(loom, times)?;
     let last = to.floor() as usize;
     let seam = match times {
@@ -163,6 +178,7 @@ struct Plan {
     lead: f64,
     /// For each frame of the bridge the parameter from that last frame on, and rho's slope.
     steps: Vec<(f64, f64)>,
+    ease: Ease,
 }
 
 /// A curve with a knot at a place: the span that begins there, and how places move.
@@ -197,7 +213,7 @@ impl Cut {
 
 impl Plan {
     /// The plan with `bridge` frames between passes.
-    fn new(loom: &Loom, from: f64, to: f64, bridge: usize) -> Result<Self> {
+    fn new(loom: &Loom, from: f64, to: f64, bridge: usize, ease: Ease) -> Result<Self> {
         let time = loom.time();
         let curve = time.curve();
         let ends = time.place_at(from).zip(time.place_at(to));
@@ -246,6 +262,7 @@ impl Plan {
             spans: vec![width / spans.max(1) as f64; spans],
             lead,
             steps,
+            ease,
         })
     }
 
@@ -313,7 +330,7 @@ impl Plan {
             places.extend([curve.advance(pair[0].place, half), pair[1].place]);
         }
         let count = self.spans.len() + 1;
-        let eased = bridge::ease(loom.pose(), curve, &places, seam + 1, count);
+        let eased = (self.ease)(loom.pose(), curve, &places, seam + 1, count);
         eased.controls()[seam + 1..][..count].to_vec()
     }
 
