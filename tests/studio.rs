@@ -335,6 +335,41 @@ impl Screen {
         Some((column + 1, row + 1))
     }
 
+    /// Waits until nothing has changed for a while: small meshes and plots come in after the text.
+    fn settle(&self) {
+        let start = Instant::now();
+        let contents = || self.shown.lock().unwrap().screen().contents();
+        let mut last = (contents(), Instant::now());
+        while last.1.elapsed() < Duration::from_millis(400) {
+            thread::sleep(Duration::from_millis(20));
+            let now = contents();
+            if now != last.0 {
+                last = (now, Instant::now());
+            }
+            assert!(start.elapsed() < PATIENCE, "never still");
+        }
+    }
+
+    /// Drags the last control point by columns and rows, again where a map drawn anew in between left
+    /// nothing at that place, until the file differs from `before`.
+    fn drag_last_control(&mut self, columns: i16, rows: i16, file: &Path, before: &str) {
+        for _ in 0..5 {
+            let at = self.last_control();
+            let to = (
+                at.0.saturating_add_signed(columns),
+                at.1.saturating_add_signed(rows),
+            );
+            self.drag(at, to);
+            let start = Instant::now();
+            while start.elapsed() < PATIENCE / 10 {
+                if std::fs::read_to_string(file).is_ok_and(|text| text != before) {
+                    return;
+                }
+                thread::sleep(Duration::from_millis(20));
+            }
+        }
+    }
+
     /// The left button goes down at one place, moves to another, and goes up.
     fn drag(&mut self, from: (u16, u16), to: (u16, u16)) {
         let (a, b) = (from, to);
@@ -380,9 +415,8 @@ fn a_control_point_dragged_is_a_line_and_dragged_again_the_same_line() {
     screen.wait("a loom of 12 frames");
     screen.press("G");
     screen.wait("frame 12.00/12");
-    let at = screen.last_control();
-    let to = (at.0 - 4, at.1 + 2);
-    screen.drag(at, to);
+    screen.settle();
+    screen.drag_last_control(-4, 2, &file, OURS);
     let once = wait_for_text(&file, |text| text.contains(".move_control("));
     assert!(
         once.starts_with("// ours\nload(\"bar.loom\")\n    .move_control("),
@@ -393,8 +427,8 @@ fn a_control_point_dragged_is_a_line_and_dragged_again_the_same_line() {
         !screen.contents().contains("running")
     });
     // The map has been drawn anew around the motion.
-    let at = screen.last_control();
-    screen.drag(at, (at.0 - 3, at.1));
+    screen.settle();
+    screen.drag_last_control(-3, 0, &file, &once);
     let twice = wait_for_text(&file, |text| text != once);
     assert_eq!(twice.matches(".move_control(").count(), 1, "{twice}");
     assert_eq!(twice.lines().count(), 3);
