@@ -60,6 +60,15 @@ fn example_poses(topology: &Arc<Topology>, points: &[f64]) -> Sequence {
     sequence(topology, &poses)
 }
 
+/// The example poses of one tube paired with those of another.
+fn pairs(source: (&Arc<Topology>, &[f64]), target: (&Arc<Topology>, &[f64])) -> Examples {
+    Examples::new(
+        example_poses(source.0, source.1),
+        example_poses(target.0, target.1),
+    )
+    .unwrap()
+}
+
 /// Everything kept: every frame is reproduced.
 fn exact(capture: &Sequence, space: &str) -> Loom {
     let n = capture.frames();
@@ -86,11 +95,7 @@ const ROUNDING: f32 = 4e-6;
 fn examples_become_their_targets() {
     let (source, points) = tube(12, 8, 0.4);
     let (target, others) = tube(9, 10, 0.7);
-    let examples = Examples::new(
-        example_poses(&source, &points),
-        example_poses(&target, &others),
-    )
-    .unwrap();
+    let examples = pairs((&source, &points), (&target, &others));
     for space in SPACES {
         let loom = exact(&example_poses(&source, &points), space.name);
         let found = transfer(&loom, &examples, &Task::default()).unwrap().output;
@@ -163,11 +168,7 @@ fn motion(topology: &Arc<Topology>, points: &[f64], space: &str) -> Loom {
 fn time_stays_and_an_edit_before_or_after_is_the_same() {
     let (topology, points) = tube(12, 8, 0.4);
     let (target, others) = tube(9, 10, 0.7);
-    let examples = Examples::new(
-        example_poses(&topology, &points),
-        example_poses(&target, &others),
-    )
-    .unwrap();
+    let examples = pairs((&topology, &points), (&target, &others));
     let on_target = |loom: &Loom| {
         let found = transfer(loom, &examples, &Task::default()).unwrap();
         found.output.loom
@@ -247,11 +248,7 @@ fn posed_f32(points: &[f64], bend: f64) -> Vec<f32> {
 fn a_loaded_loom_is_transferred_like_the_fitted_one() {
     let (topology, points) = tube(12, 8, 0.4);
     let (target, others) = tube(9, 10, 0.7);
-    let examples = Examples::new(
-        example_poses(&topology, &points),
-        example_poses(&target, &others),
-    )
-    .unwrap();
+    let examples = pairs((&topology, &points), (&target, &others));
     for space in SPACES {
         let loom = motion(&topology, &points, space.name);
         let loaded = format::loom::read(&format::loom::write(&loom).unwrap()).unwrap();

@@ -23,6 +23,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::VertexCorners;
+use super::components::root;
 
 /// Distances from places against distances from planes.
 const SPREAD: f64 = 1e-3;
@@ -592,15 +593,6 @@ impl Mesh {
             curve,
         }
     }
-}
-
-/// Where a vertex ended; paths are halved on the way.
-fn root(parent: &mut [u32], mut vertex: u32) -> u32 {
-    while parent[vertex as usize] != vertex {
-        parent[vertex as usize] = parent[parent[vertex as usize] as usize];
-        vertex = parent[vertex as usize];
-    }
-    vertex
 }
 
 #[cfg(test)]

@@ -69,8 +69,8 @@ impl Components {
     }
 }
 
-/// The lowest node joined with `node`; paths are halved on the way.
-fn root(parent: &mut [u32], mut node: u32) -> u32 {
+/// The node that stands for all joined with `node` (disjoint sets); paths are halved on the way.
+pub(super) fn root(parent: &mut [u32], mut node: u32) -> u32 {
     while parent[node as usize] != node {
         parent[node as usize] = parent[parent[node as usize] as usize];
         node = parent[node as usize];

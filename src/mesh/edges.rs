@@ -1,6 +1,7 @@
 //! The edges of a topology's polygons, and what can be read off them: its borders and its parts.
 
 use super::Topology;
+use super::components::root;
 
 /// The undirected edges of all polygons, each once.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -66,15 +67,6 @@ impl Edges {
         }
         used.iter().filter(|used| **used).count() - joins
     }
-}
-
-/// The representative of a vertex's part; paths are halved on the way.
-fn root(parent: &mut [u32], mut vertex: u32) -> u32 {
-    while parent[vertex as usize] != vertex {
-        parent[vertex as usize] = parent[parent[vertex as usize] as usize];
-        vertex = parent[vertex as usize];
-    }
-    vertex
 }
 
 #[cfg(test)]

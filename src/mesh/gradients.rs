@@ -158,14 +158,7 @@ impl ReferenceTriangle {
         let (b1, b2, n) = (self.along, self.across(), self.normal);
         let (u1, u2) = (b1 * s11 + b2 * s12, b1 * s12 + b2 * s22);
         let entry = |i: usize, j: usize| u1[i] * b1[j] + u2[i] * b2[j] + n[i] * n[j];
-        [
-            entry(0, 0),
-            entry(0, 1),
-            entry(0, 2),
-            entry(1, 1),
-            entry(1, 2),
-            entry(2, 2),
-        ]
+        upper_triangle(entry)
     }
 
     /// S b1 and S b2 for S as xx, xy, xz, yy, yz, zz.
@@ -276,6 +269,12 @@ pub fn stretches_in_space(
     let u1 = plus(&along, *s11, &across, *s12);
     let u2 = plus(&along, *s12, &across, *s22);
     let entry = |i: usize, j: usize| u1[i] * along[j] + u2[i] * across[j] + normal[i] * normal[j];
+    upper_triangle(entry)
+}
+
+/// xx, xy, xz, yy, yz, zz of a symmetric 3 x 3 matrix.
+#[inline(always)]
+fn upper_triangle<T>(entry: impl Fn(usize, usize) -> T) -> [T; 6] {
     [
         entry(0, 0),
         entry(0, 1),
