@@ -11,6 +11,7 @@ pub mod ordered;
 pub mod pins;
 pub mod pose_map;
 pub mod position_error;
+mod reach;
 pub mod report;
 pub mod session;
 pub mod subspace;
@@ -325,7 +326,7 @@ impl Loom {
     /// Writes psi(t), 3V coordinates, to `positions`.
     ///
     /// # Errors
-    /// `t` lies outside \[1, n\].
+    /// `t` lies outside \[1, n\]; a coordinate is beyond single precision.
     ///
     /// # Panics
     /// `positions` is not 3V long.
@@ -335,21 +336,25 @@ impl Loom {
             Some(_) => Some(self.root_at(t)?),
             None => None,
         };
-        self.decode(p, motion, scratch, positions);
-        Ok(())
+        match self.decode(p, motion, scratch, positions) {
+            true => Ok(()),
+            false => Err(beyond(&format!("time {t}"))),
+        }
     }
 
     /// The shape at a point of the map, g of it decoded, without root motion: 3V coordinates.
     ///
     /// # Errors
-    /// `p` is not finite.
+    /// `p` is not finite; a coordinate is beyond single precision.
     pub fn pose_at(&self, p: Point) -> Result<Vec<f32>> {
         if !(p[0].is_finite() && p[1].is_finite()) {
             return Diagnostic::error("the point of the map is not finite").err();
         }
         let mut positions = vec![0.0; 3 * self.parts.topology.vertices()];
-        self.decode(p, None, &mut Scratch::default(), &mut positions);
-        Ok(positions)
+        match self.decode(p, None, &mut Scratch::default(), &mut positions) {
+            true => Ok(positions),
+            false => Err(beyond(&format!("({}, {})", p[0], p[1]))),
+        }
     }
 
     /// psi'(t), 3V numbers, coordinates per frame. Analytic through rho, f~, g, h and the root motion;
@@ -412,14 +417,14 @@ impl Loom {
         (decoded(0.0), change.collect())
     }
 
-    /// Writes the shape at `p`, moved by `motion`.
+    /// Writes the shape at `p`, moved by `motion`, and says whether it is finite.
     fn decode(
         &self,
         p: Point,
         motion: Option<Isometry3<f64>>,
         scratch: &mut Scratch,
         positions: &mut [f32],
-    ) {
+    ) -> bool {
         let Parts {
             space, pose, shape, ..
         } = &self.parts;
@@ -428,18 +433,19 @@ impl Loom {
         pose.evaluate(p, &mut scratch.x);
         if space.is_identity() {
             scratch.z.resize(BLOCK, 0.0);
+            let mut finite = true;
             for (block, out) in positions.chunks_mut(BLOCK).enumerate() {
                 let z = &mut scratch.z[..out.len()];
                 shape.evaluate_from(block * BLOCK, &scratch.x, z);
-                store(z, motion.as_ref(), out);
+                finite &= store(z, motion.as_ref(), out);
             }
-            return;
+            return finite;
         }
         scratch.z.resize(shape.dimension(), 0.0);
         scratch.positions.resize(positions.len(), 0.0);
         shape.evaluate(&scratch.x, &mut scratch.z);
         space.decode(&scratch.z, &mut scratch.positions);
-        store(&mut scratch.positions, motion.as_ref(), positions);
+        store(&mut scratch.positions, motion.as_ref(), positions)
     }
 
     fn outside(&self, t: f64) -> Box<Diagnostic> {
@@ -464,17 +470,27 @@ impl Motion {
     }
 }
 
-/// Moves positions and rounds them to single precision.
-fn store(z: &mut [f64], motion: Option<&Motion>, out: &mut [f32]) {
+/// Moves positions and rounds them to single precision; whether all are finite there.
+fn store(z: &mut [f64], motion: Option<&Motion>, out: &mut [f32]) -> bool {
     if let Some(Motion { turn, shift }) = motion {
         for p in z.chunks_exact_mut(3) {
             let moved = turn * Vector3::new(p[0], p[1], p[2]) + shift;
             p.copy_from_slice(moved.as_slice());
         }
     }
+    let mut finite = true;
     for (out, z) in out.iter_mut().zip(z) {
         *out = *z as f32;
+        finite &= out.is_finite();
     }
+    finite
+}
+
+fn beyond(at: &str) -> Box<Diagnostic> {
+    let error = Diagnostic::error(format!(
+        "the shape at {at} is too large for single precision"
+    ));
+    Box::new(error.hint("an edit or an extension has taken the motion very far out"))
 }
 
 #[cfg(test)]
