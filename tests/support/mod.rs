@@ -82,19 +82,7 @@ impl Run {
     /// The run has to have failed with exit code 1, a message with all these parts, and a hint.
     #[track_caller]
     pub fn fails_with(&self, parts: &[&str]) {
-        assert_eq!(self.code, Some(1), "stderr: {}", self.stderr);
-        for part in parts {
-            assert!(
-                self.stderr.contains(part),
-                "no {part:?} in: {}",
-                self.stderr
-            );
-        }
-        assert!(
-            self.stderr.contains("error: "),
-            "no error in: {}",
-            self.stderr
-        );
+        self.fails_with_any(parts);
         assert!(
             self.stderr.contains("\n  hint: "),
             "no hint in: {}",
