@@ -7,10 +7,11 @@ use serde_json::{Value, json};
 
 use super::args::{Input, positive};
 use super::fit::spaces;
+use super::print::Style;
 use super::report;
 use super::session::{Outcome, Session};
 use crate::diag::Result;
-use crate::inbetween::{MotionFrames, MotionReport};
+use crate::inbetween::{GhostReport, MotionFrames, MotionReport};
 use crate::pipeline::{
     self, CompleteRequest, Frames, InputSpec, Key, Keyed, Output, PictureFormat, Velocities,
     key_path, plot_motion,
@@ -161,8 +162,9 @@ struct Ghost {
     #[arg(long, value_name = "FACES|auto|off", default_value = "auto")]
     ghost: String,
 
-    /// How the full mesh follows: one sparse solve a frame, or each vertex by itself
-    #[arg(long, value_parser = words(&["solve", "direct"]), default_value = "solve")]
+    /// How the full mesh follows: one sparse solve a frame for gradients and places; for gradients only
+    /// (X19's deformation transfer); or each vertex by itself
+    #[arg(long, value_parser = words(&["solve", "transfer", "direct"]), default_value = "solve")]
     lift: String,
 
     /// Whether what the ghost cannot carry at the keys is kept and blended, so that keys are met
@@ -311,9 +313,51 @@ fn told(session: &Session, frames: &MotionFrames, saved: &pipeline::Saved) -> St
             format!("{} faces, {} vertices", ghost.faces, ghost.vertices),
         ));
     }
+    let costs = found
+        .ghost
+        .as_ref()
+        .map(|ghost| collapses(session.style, ghost));
     format!(
-        "{}{}",
+        "{}{}{}",
         report::saved(session.style, saved),
-        report::table(session.style, "motion", &rows)
+        report::table(session.style, "motion", &rows),
+        costs.unwrap_or_default()
+    )
+}
+
+/// What the collapses to a ghost cost by the faces that they leave, from the first to the last; bars
+/// are as long as the logarithm of the cost.
+fn collapses(style: Style, ghost: &GhostReport) -> String {
+    const ROWS: usize = 12;
+    const WIDTH: f64 = 40.0;
+    let step = ghost.curve.len().div_ceil(ROWS).max(1);
+    let mut shown: Vec<(usize, f64)> = ghost.curve.iter().rev().step_by(step).copied().collect();
+    shown.reverse();
+    let costs = || {
+        shown
+            .iter()
+            .map(|(_, cost)| *cost)
+            .filter(|cost| *cost > 0.0)
+    };
+    let (least, most) = costs().fold((f64::INFINITY, 0.0), |(least, most), cost| {
+        (f64::min(least, cost), f64::max(most, cost))
+    });
+    let bar = |cost: f64| match most > least && cost > 0.0 {
+        true => (1.0 + (WIDTH - 1.0) * (cost / least).ln() / (most / least).ln()) as usize,
+        false => 0,
+    };
+    let row = |&(faces, cost): &(usize, f64)| {
+        let text = format!("{:<10}{}", report::number(cost), "#".repeat(bar(cost)));
+        (faces.to_string(), text.trim_end().to_string())
+    };
+    let rows: Vec<(String, String)> = shown.iter().map(row).collect();
+    let rows: Vec<(&str, String)> = rows
+        .iter()
+        .map(|(faces, text)| (faces.as_str(), text.clone()))
+        .collect();
+    report::table(
+        style,
+        "collapses: faces left and what the last one cost",
+        &rows,
     )
 }

@@ -6,6 +6,8 @@
 
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use super::drift::Drift;
 use super::ghost::{Following, Ghost, GhostOptions};
 use super::keys::{Keys, same_faces, widened};
@@ -14,8 +16,8 @@ use crate::diag::{Diagnostic, Result, Warned};
 use crate::math::cubic_spline::Ends;
 use crate::math::key_spline::{Controls, Handle, KeySpline};
 use crate::mesh::rigid_align::{mean, rigid};
-use crate::mesh::{Bounds, FrameSource, Topology, usual_patches};
-use crate::space::{ShapeSpace, Spaces, encode_frames};
+use crate::mesh::{Bounds, FrameSource, Topology, torn};
+use crate::space::{Fine, ShapeSpace, Spaces, follow_frames};
 use crate::task::Task;
 
 /// The space that takes the largest motions (X19 §4.2).
@@ -107,19 +109,14 @@ pub fn complete(keys: &Keys, options: &CompleteOptions, task: &Task) -> Result<W
         },
     };
     let topology = keys.poses().topology();
-    let triangles = topology.triangles().len();
     let (space, (spline, large_turns)) = match &ghost {
         None => {
-            let space = open_space(topology, &options.space, &poses, triangles)?;
-            let through = track.through(&*space, &poses, &<[f64]>::to_vec, task)?;
+            let space = open_space(topology, &options.space, &poses)?;
+            let encode = |shape: &[f64], row: &mut [f64]| space.encode(shape, row);
+            let through = track.through(&*space, &encode, &poses, task)?;
             (space, through)
         }
-        Some(ghost) => {
-            let ghosts: Vec<Vec<f64>> = poses.iter().map(|pose| ghost.pick(pose)).collect();
-            let space = open_space(&ghost.topology, &options.space, &ghosts, triangles)?;
-            let through = track.through(&*space, &ghosts, &|pose| ghost.pick(pose), task)?;
-            (space, through)
-        }
+        Some(ghost) => track.behind(ghost, &options.space, &poses, task)?,
     };
     let following = match &ghost {
         Some(ghost) => Some(track.follow(ghost, &poses, options.ghost, task)?),
@@ -145,21 +142,26 @@ pub fn complete(keys: &Keys, options: &CompleteOptions, task: &Task) -> Result<W
     })
 }
 
-/// The space of `topology` about the first of `poses`. A ghost has the patches of its mesh, of which
-/// `triangles` is the size: where rotations are taken relative to what decides on the way between keys.
+/// The space of `topology` about the first of `poses`.
 fn open_space(
     topology: &Arc<Topology>,
     name: &str,
     poses: &[Vec<f64>],
-    triangles: usize,
 ) -> Result<Arc<dyn ShapeSpace>> {
     let spaces = Spaces::new(Arc::clone(topology), &poses[0]);
-    let poses: Vec<&[f64]> = poses.iter().map(Vec::as_slice).collect();
-    let ghost = topology.triangles().len() < triangles;
-    Ok(match name == "patch-lri" && ghost {
-        true => spaces.open_patched(&poses, usual_patches(triangles))?,
-        false => spaces.open(name, &poses)?,
+    let poses = slices(poses);
+    let weights = match name {
+        "patch-lri" => torn(topology.triangles(), &poses),
+        _ => Vec::new(),
+    };
+    Ok(match weights.is_empty() {
+        true => spaces.open(name, &poses)?,
+        false => spaces.open_weighted(&poses, &weights)?,
     })
+}
+
+fn slices(poses: &[Vec<f64>]) -> Vec<&[f64]> {
+    poses.iter().map(Vec::as_slice).collect()
 }
 
 /// The keys' shapes, without the drift.
@@ -180,28 +182,62 @@ struct Track<'a> {
     controls: Controls<'a>,
 }
 
-/// The part of a shape of the mesh that is followed: all, the ghost's vertices, the mean.
-type Part<'a> = &'a dyn Fn(&[f64]) -> Vec<f64>;
+/// Writes the coordinates of a shape of the mesh: its own, its ghost's, its mean.
+type Encode<'a> = &'a (dyn Fn(&[f64], &mut [f64]) + Sync);
 
 impl Track<'_> {
-    /// The spline through the coordinates of `poses`, which are the `part` of the keys' shapes that
-    /// `space` holds, and how many rotations turn far between keys.
+    /// The space of a ghost and the spline through its coordinates. In `patch-lri` the ghost has the
+    /// patches of the mesh, turned as there: what rotations are taken relative to decides on the way
+    /// between keys.
+    fn behind(
+        &self,
+        ghost: &Ghost,
+        name: &str,
+        poses: &[Vec<f64>],
+        task: &Task,
+    ) -> Result<(Arc<dyn ShapeSpace>, (KeySpline, usize))> {
+        let ghosts: Vec<Vec<f64>> = poses.iter().map(|pose| ghost.pick(pose)).collect();
+        if name != "patch-lri" {
+            let space = open_space(&ghost.topology, name, &ghosts)?;
+            let encode = |shape: &[f64], row: &mut [f64]| space.encode(&ghost.pick(shape), row);
+            let through = self.through(&*space, &encode, poses, task)?;
+            return Ok((space, through));
+        }
+        let fine = Fine {
+            topology: self.keys.poses().topology(),
+            poses: &slices(poses),
+            weights: &ghost.torn_of_mesh,
+            carriers: &ghost.carriers(),
+        };
+        let spaces = Spaces::new(Arc::clone(&ghost.topology), &ghosts[0]);
+        let coarse = spaces.open_coarse(&fine, &ghost.torn)?;
+        let encode = |shape: &[f64], row: &mut [f64]| coarse.encode(shape, &ghost.pick(shape), row);
+        let through = self.through(&*coarse.space(), &encode, poses, task)?;
+        Ok((coarse.space(), through))
+    }
+
+    /// The spline through the coordinates in `space` of the shapes `poses` of the mesh, and how many
+    /// rotations turn far between keys.
     fn through(
         &self,
         space: &dyn ShapeSpace,
+        encode: Encode<'_>,
         poses: &[Vec<f64>],
-        part: Part<'_>,
         task: &Task,
     ) -> Result<(KeySpline, usize)> {
         let d = space.dimension();
         let mut rows = vec![0.0; poses.len() * d];
-        let read = |key: usize, positions: &mut [f64]| -> Result<()> {
-            positions.copy_from_slice(&poses[key]);
-            Ok(())
-        };
-        let turns = encode_frames(space, poses[0].len() / 3, read, &mut rows, task)?;
+        rows.par_chunks_mut(d.max(1))
+            .zip(poses)
+            .try_for_each(|(row, pose)| {
+                task.check()?;
+                encode(pose, row);
+                task.step();
+                Ok::<_, Box<Diagnostic>>(())
+            })?;
+        let turns = follow_frames(space, &mut rows);
         let slope = |velocity: &Option<Velocity>, row: &[f64]| match velocity {
-            Some(velocity) => slope(velocity, space, part, row),
+            Some(velocity) => slope(velocity, space, encode, row),
             None => Vec::new(),
         };
         let slopes = match self.boundary {
@@ -237,9 +273,9 @@ impl Track<'_> {
     ) -> Result<Following> {
         task.phase("follow", 0);
         let point = Arc::new(Topology::points(1));
-        let means: Vec<Vec<f64>> = poses.iter().map(|pose| middle(pose)).collect();
-        let space = Spaces::new(point, &means[0]).open("vertices", &[])?;
-        let (mean, _) = self.through(&*space, &means, &middle, &Task::default())?;
+        let space = Spaces::new(point, &middle(&poses[0])).open("vertices", &[])?;
+        let encode = |shape: &[f64], row: &mut [f64]| row.copy_from_slice(&middle(shape));
+        let (mean, _) = self.through(&*space, &encode, poses, &Task::default())?;
         let weights = options.residual.then(|| self.cardinal()).transpose()?;
         let topology = self.keys.poses().topology();
         Following::new(ghost, topology, poses, options.lift, weights, mean)
@@ -265,15 +301,15 @@ impl Track<'_> {
 }
 
 /// The mean vertex.
-fn middle(pose: &[f64]) -> Vec<f64> {
-    mean(pose).as_slice().to_vec()
+fn middle(pose: &[f64]) -> [f64; 3] {
+    mean(pose).into()
 }
 
-/// A velocity at a key, in the space that holds the `part` of shapes; `row` are the key's coordinates.
-fn slope(velocity: &Velocity, space: &dyn ShapeSpace, part: Part<'_>, row: &[f64]) -> Vec<f64> {
+/// A velocity at a key in the space whose coordinates `encode` finds; `row` are the key's.
+fn slope(velocity: &Velocity, space: &dyn ShapeSpace, encode: Encode<'_>, row: &[f64]) -> Vec<f64> {
     let encoded = |shape: &[f32], near: &[f64]| {
         let mut coordinates = vec![0.0; row.len()];
-        space.encode(&part(&widened(shape)), &mut coordinates);
+        encode(&widened(shape), &mut coordinates);
         space.follow(near, &mut coordinates);
         coordinates
     };

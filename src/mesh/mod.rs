@@ -18,6 +18,7 @@ mod sequence;
 mod skeleton;
 mod subdivide;
 mod topology;
+mod torn;
 
 pub use bounds::Bounds;
 pub use components::Components;
@@ -33,3 +34,4 @@ pub use sequence::{FrameSource, Sequence};
 pub use skeleton::{Joint, Mismatch, Skeleton, SkeletonError, SkeletonPoses};
 pub use subdivide::subdivide;
 pub use topology::{Attributes, Group, GroupKind, Topology, TopologyError};
+pub use torn::torn;

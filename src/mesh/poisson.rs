@@ -79,6 +79,8 @@ pub struct Poisson {
     analysis: Arc<PoissonAnalysis>,
     reference: Arc<[ReferenceTriangle]>,
     factor: Factor,
+    /// By what each triangle counts beside its area; empty where all count fully.
+    weights: Vec<f64>,
     /// How strongly each vertex is drawn to its place; empty where none is.
     springs: Vec<f64>,
     pool: Mutex<Vec<Workspace>>,
@@ -100,44 +102,72 @@ impl Poisson {
         analysis: Arc<PoissonAnalysis>,
         reference: Arc<[ReferenceTriangle]>,
     ) -> Result<Self, SparseError> {
-        Poisson::with_springs(analysis, reference, Vec::new())
+        Poisson::with(analysis, reference, Vec::new(), Vec::new())
+    }
+
+    /// The system in which each triangle counts by one of `weights` (> 0) beside its area; without weights
+    /// that of [`Poisson::new`].
+    ///
+    /// # Errors
+    /// As [`Poisson::new`].
+    ///
+    /// # Panics
+    /// There are weights, but not one a triangle.
+    pub fn weighted(
+        analysis: Arc<PoissonAnalysis>,
+        reference: Arc<[ReferenceTriangle]>,
+        weights: Vec<f64>,
+    ) -> Result<Self, SparseError> {
+        Poisson::with(analysis, reference, weights, Vec::new())
     }
 
     /// The screened system: places are given too, and count beside gradients over lengths above
     /// `screening` (in the mesh's unit, > 0). Minimises sum_f a_f |grad v - D_f|^2 + sum_i m_i |v_i - p_i|^2
-    /// / screening^2 with a third m_i of the area around each vertex.
+    /// / screening^2 with a third m_i of the area around each vertex; areas count by `weights` as in
+    /// [`Poisson::weighted`].
     ///
     /// # Errors
     /// As [`Poisson::new`].
+    ///
+    /// # Panics
+    /// As [`Poisson::weighted`].
     pub fn screened(
         analysis: Arc<PoissonAnalysis>,
         reference: Arc<[ReferenceTriangle]>,
+        weights: Vec<f64>,
         screening: f64,
     ) -> Result<Self, SparseError> {
         let mut springs = vec![0.0; analysis.symbolic.pattern().unknowns()];
-        for (triangle, rest) in analysis.triangles.iter().zip(&reference[..]) {
+        for (face, triangle) in analysis.triangles.iter().enumerate() {
+            let area = reference[face].area() * weight(&weights, face);
             for &vertex in triangle {
-                springs[vertex as usize] += rest.area() / (3.0 * screening * screening);
+                springs[vertex as usize] += area / (3.0 * screening * screening);
             }
         }
         // no part is without a hold, however small it is
         for &vertex in analysis.components.first() {
             springs[vertex as usize] += 1.0;
         }
-        Poisson::with_springs(analysis, reference, springs)
+        Poisson::with(analysis, reference, weights, springs)
     }
 
-    fn with_springs(
+    fn with(
         analysis: Arc<PoissonAnalysis>,
         reference: Arc<[ReferenceTriangle]>,
+        weights: Vec<f64>,
         springs: Vec<f64>,
     ) -> Result<Self, SparseError> {
-        let entries = laplacian(&analysis, &reference, &springs);
+        assert!(
+            weights.is_empty() || weights.len() == reference.len(),
+            "one weight a triangle"
+        );
+        let entries = laplacian(&analysis, (&reference, &weights), &springs);
         let factor = analysis.symbolic.factor(&entries)?;
         Ok(Poisson {
             analysis,
             reference,
             factor,
+            weights,
             springs,
             pool: Mutex::default(),
         })
@@ -167,6 +197,9 @@ impl Poisson {
                 for (at, pull) in pulls.iter_mut().enumerate() {
                     let face = CHUNK * chunk + at;
                     *pull = pulled(&self.reference[face], &images(face));
+                    if !self.weights.is_empty() {
+                        *pull = pull.map(|pull| pull * self.weights[face]);
+                    }
                 }
             });
         self.gather(pulls, sides);
@@ -262,7 +295,7 @@ fn point(positions: &[f64], vertex: usize) -> Vector3<f64> {
 /// unless there are `springs`. Columns are summed side by side, each over the corners at its vertex.
 fn laplacian(
     analysis: &PoissonAnalysis,
-    reference: &[ReferenceTriangle],
+    (reference, factors): (&[ReferenceTriangle], &[f64]),
     springs: &[f64],
 ) -> Vec<f64> {
     let pattern = analysis.symbolic.pattern();
@@ -282,7 +315,8 @@ fn laplacian(
             let (column, after) = entries.split_at_mut(rows.len());
             for &corner in analysis.corners.at(vertex) {
                 let (face, from) = (corner as usize / 3, corner as usize % 3);
-                let weights = half_cotangents(&reference[face]);
+                let factor = weight(factors, face);
+                let weights = half_cotangents(&reference[face]).map(|half| half * factor);
                 for to in [(from + 1) % 3, (from + 2) % 3] {
                     // sides 01, 12, 20: the one between two corners
                     let weight = weights[if (from + 1) % 3 == to { from } else { to }];
@@ -311,6 +345,14 @@ fn laplacian(
         }
     }
     entries
+}
+
+/// By what a triangle counts.
+fn weight(weights: &[f64], face: usize) -> f64 {
+    match weights {
+        [] => 1.0,
+        weights => weights[face],
+    }
 }
 
 /// Half the cotangents of the angles opposite the sides 01, 12, 20.
@@ -396,7 +438,7 @@ mod tests {
         ];
         let analysis = PoissonAnalysis::new(5, &triangles).unwrap();
         let reference = reference_triangles(&triangles, &pose);
-        let poisson = Poisson::screened(analysis, reference, 2.0).unwrap();
+        let poisson = Poisson::screened(analysis, reference, Vec::new(), 2.0).unwrap();
         let images = |face: usize| {
             let rest = &poisson.reference()[face];
             let [a, b, c] = triangles[face].map(|v: u32| point(&pose, v as usize));
@@ -436,5 +478,31 @@ mod tests {
             Poisson::new(analysis, reference_triangles(&[[0, 1, 2]], &pose)),
             Err(SparseError::NotPositiveDefinite { unknown: 0..3 })
         ));
+    }
+
+    #[test]
+    fn a_triangle_of_little_weight_gives_way_to_the_others() {
+        // a square in two triangles, and a third beside it that wants to be elsewhere
+        let triangles = [[0, 1, 2], [1, 3, 2], [1, 4, 3]];
+        let pose = [
+            0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1.0, 0.0, 2.0, 0.5, 0.0,
+        ];
+        let off = |weights: Vec<f64>| {
+            let analysis = PoissonAnalysis::new(5, &triangles).unwrap();
+            let reference = reference_triangles(&triangles, &pose);
+            let poisson = Poisson::weighted(analysis, reference, weights).unwrap();
+            let mut found = vec![0.0; 15];
+            let images = |face: usize| {
+                let rest = &poisson.reference()[face];
+                let grown = if face == 2 { 3.0 } else { 1.0 };
+                [rest.along * grown, rest.across() * grown]
+            };
+            poisson.solve(images, &mut found);
+            let square = found[..12].iter().zip(&pose);
+            square.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+        };
+        let full = off(Vec::new());
+        assert!(full > 0.1 && (off(vec![1.0; 3]) - full).abs() < 1e-14);
+        assert!(off(vec![1.0, 1.0, 1e-6]) < 1e-5);
     }
 }

@@ -40,7 +40,7 @@ pub struct CompleteRequest {
     pub overshoot: Option<f64>,
     /// Faces of the ghost mesh, as a number, "auto" or "off".
     pub ghost: Option<String>,
-    /// solve or direct.
+    /// solve, transfer or direct.
     pub lift: Option<String>,
     /// Whether what the ghost misses at the keys is kept.
     pub residual: Option<bool>,
@@ -131,8 +131,9 @@ impl CompleteRequest {
             lift: match self.lift.as_deref() {
                 None => default.lift,
                 Some("solve") => Lift::Solve,
+                Some("transfer") => Lift::Transfer,
                 Some("direct") => Lift::Direct,
-                Some(other) => return unknown("lift", other, "solve, direct"),
+                Some(other) => return unknown("lift", other, "solve, transfer, direct"),
             },
             residual: self.residual.unwrap_or(default.residual),
         })

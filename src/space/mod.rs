@@ -17,6 +17,7 @@ mod living;
 mod lri;
 mod orientation;
 mod patch_lri;
+mod patching;
 mod placement;
 mod refine;
 mod registry;
@@ -33,9 +34,10 @@ use crate::math::sparse::SparseError;
 pub use gradients::Gradients;
 pub use lengths_angles::LengthsAngles;
 pub use lri::Lri;
-pub use patch_lri::PatchLri;
+pub use patch_lri::{CoarsePatchLri, PatchLri};
+pub use patching::Fine;
 pub use registry::{SPACES, SpaceKind, Spaces, State};
-pub use sequence::{LARGE_TURN, encode_frames};
+pub use sequence::{LARGE_TURN, encode_frames, follow_frames};
 pub use vertices::Vertices;
 
 /// What may happen to a shape without a change of its coordinates (the stored position and

@@ -4,6 +4,8 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::{Arc, OnceLock};
 
 use super::living::Living;
+use super::patch_lri::CoarsePatchLri;
+use super::patching::{self, Fine, FinePatches, Patching};
 use super::{Block, Gradients, LengthsAngles, Lri, PatchLri, ShapeSpace, SpaceError, Vertices};
 use crate::mesh::{
     Hinges, Poisson, PoissonAnalysis, ReferenceTriangle, Topology, reference_triangles,
@@ -114,13 +116,16 @@ fn patch_lri(
     state: Option<&State>,
 ) -> Result<Arc<dyn ShapeSpace>, SpaceError> {
     let (poisson, reference, hinges) = (spaces.poisson()?, spaces.reference(), spaces.hinges()?);
-    Ok(Arc::new(match state {
+    let (triangles, rest) = (spaces.topology.triangles(), poisson.reference());
+    let patch = match state {
         None => {
-            let sought = usual_patches(spaces.topology.triangles().len());
-            PatchLri::grown(poisson, reference, &hinges, poses, sought)?
+            let sought = usual_patches(triangles.len());
+            patching::grow((rest, triangles, &[]), &hinges, (&reference, poses), sought)
         }
-        Some(state) => PatchLri::new(poisson, reference, &hinges, state.patches.clone())?,
-    }))
+        Some(state) => state.patches.clone(),
+    };
+    let patching = Patching::new(rest, &[], &hinges, patch)?;
+    Ok(Arc::new(PatchLri::new(poisson, reference, patching)))
 }
 
 /// What a space is made of besides connectivity, for storing it.
@@ -344,18 +349,58 @@ fn fingerprint(poses: &[&[f64]]) -> u64 {
 }
 
 impl Spaces {
-    /// `patch-lri` with about so many patches: a coarse mesh moves like a finer one that has as many.
+    /// `patch-lri` in which triangles count by `weights` beside their area, as those do that are torn between `poses`
+    /// ([`crate::mesh::torn`]).
     ///
     /// # Errors
     /// As [`Spaces::open`].
-    pub fn open_patched(
+    ///
+    /// # Panics
+    /// There is not one weight a triangle.
+    pub fn open_weighted(
         &self,
         poses: &[&[f64]],
-        patches: usize,
+        weights: &[f64],
     ) -> Result<Arc<dyn ShapeSpace>, SpaceError> {
-        let (poisson, hinges) = (self.poisson()?, self.hinges()?);
-        let grown = PatchLri::grown(poisson, self.reference(), &hinges, poses, patches)?;
-        Ok(Arc::new(grown))
+        let (triangles, rest, hinges) = (self.topology.triangles(), self.rest(), self.hinges()?);
+        let sought = usual_patches(triangles.len());
+        let poses = (&self.reference[..], poses);
+        let patch = patching::grow((&rest, triangles, weights), &hinges, poses, sought);
+        let patching = Patching::new(&rest, weights, &hinges, patch)?;
+        let poisson = Poisson::weighted(self.analysis()?, rest, weights.to_vec())?;
+        Ok(Arc::new(PatchLri::new(
+            Arc::new(poisson),
+            self.reference(),
+            patching,
+        )))
+    }
+
+    /// `patch-lri` of a coarse mesh that stands for `fine`: patches, and how they turn against each other,
+    /// are those of the finer mesh. Triangles of the coarse mesh count by `weights`, unless there are none.
+    ///
+    /// # Errors
+    /// As [`Spaces::open`].
+    ///
+    /// # Panics
+    /// `fine` has another number of carriers than triangles, or names a triangle that there is not.
+    pub fn open_coarse(
+        &self,
+        fine: &Fine<'_>,
+        weights: &[f64],
+    ) -> Result<CoarsePatchLri, SpaceError> {
+        let hinges = self.hinges()?;
+        let poisson = match weights {
+            [] => self.poisson()?,
+            some => Arc::new(Poisson::weighted(
+                self.analysis()?,
+                self.rest(),
+                some.to_vec(),
+            )?),
+        };
+        let triangles = self.topology.triangles().len();
+        let (fine, patching) = FinePatches::grown(fine, triangles, &hinges)?;
+        let space = PatchLri::new(poisson, self.reference(), patching);
+        Ok(CoarsePatchLri::new(space, fine))
     }
 }
 

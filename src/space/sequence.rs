@@ -48,7 +48,7 @@ pub fn encode_frames<E: From<Cancelled> + Send>(
 }
 
 /// Draws the branches of each row from the row before; gives the number of large turns.
-fn follow_frames(space: &dyn ShapeSpace, rows: &mut [f64]) -> usize {
+pub fn follow_frames(space: &dyn ShapeSpace, rows: &mut [f64]) -> usize {
     let dimension = space.dimension();
     let mut turns = 0;
     let mut rest = rows;

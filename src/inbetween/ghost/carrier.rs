@@ -19,6 +19,8 @@ const STEPS: usize = 64;
 /// Three vertices of the ghost and their weights, which sum to 1 and are not negative.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Carrier {
+    /// Which triangle; 0 where there is none.
+    pub(super) triangle: u32,
     pub(super) vertices: [u32; 3],
     pub(super) weights: [f32; 3],
 }
@@ -27,6 +29,7 @@ impl Carrier {
     /// Carried by one vertex.
     fn at(vertex: u32) -> Self {
         Carrier {
+            triangle: 0,
             vertices: [vertex; 3],
             weights: [1.0, 0.0, 0.0],
         }
@@ -110,15 +113,17 @@ impl<'a> Walk<'a> {
             let before = best.0;
             for vertex in around {
                 for &corner in self.corners.at(vertex as usize) {
-                    let triangle = self.triangles[corner as usize / 3];
+                    let triangle = corner / 3;
+                    let vertices = self.triangles[triangle as usize];
                     let (distance, weights) =
-                        nearest(point, triangle.map(|v| self.places[v as usize]));
+                        nearest(point, vertices.map(|v| self.places[v as usize]));
                     if distance < best.0 {
                         let weights = weights.map(|weight| weight as f32);
                         best = (
                             distance,
                             Carrier {
-                                vertices: triangle,
+                                triangle,
+                                vertices,
                                 weights,
                             },
                         );

@@ -2,8 +2,10 @@
 //! the blended turn of its carrier as its gradient, and one sparse solve finds the places. The system is
 //! that of the first key, factored once for all frames.
 //!
-//! Gradients alone do not say where a limb ends: errors along it add up. Over lengths of more than a few
-//! of the ghost's edges the places of the direct lift ([`super::direct`]) count too.
+//! Gradients alone do not say where a limb ends: errors along it add up. Over lengths of more than the
+//! screening, about one of the ghost's edges, the places of the direct lift ([`super::direct`]) count too. Three poses of a
+//! galloping horse of 18 560 triangles behind 2000: KG error 0.8 %, 4.2 % without the residual; with gradients
+//! only, as X19 has it, 1.9 % and 16 % (`examples/xia_ghost.rs`).
 
 use std::sync::Arc;
 
@@ -25,13 +27,14 @@ pub(super) struct Gradients {
 }
 
 impl Gradients {
-    /// For the keys' shapes `poses`; places count over lengths above `screening`. `turns` gives the turns of the ghost's vertices at a key. The
-    /// residual is kept where `keep` says so.
+    /// For the keys' shapes `poses`; triangles count by `weights`, unless there are none, and places over lengths above
+    /// `screening`. `turns` gives the turns of the ghost's vertices at a key. The residual is kept where
+    /// `keep` says so.
     pub(super) fn new(
         topology: &Topology,
         poses: &[Vec<f64>],
         carriers: Vec<Carrier>,
-        screening: f64,
+        (weights, screening): (Vec<f64>, f64),
         turns: impl Fn(usize) -> Vec<Turn>,
         keep: bool,
     ) -> Result<Self> {
@@ -39,7 +42,7 @@ impl Gradients {
         let analysis =
             PoissonAnalysis::new(topology.vertices(), triangles).map_err(SpaceError::from)?;
         let reference = reference_triangles(triangles, &poses[0]);
-        let poisson = Poisson::screened(analysis, Arc::clone(&reference), screening);
+        let poisson = Poisson::screened(analysis, Arc::clone(&reference), weights, screening);
         let poisson = poisson.map_err(SpaceError::from)?;
         let keys = if keep { poses.len() } else { 0 };
         let turns: Vec<Vec<Turn>> = (0..keys).map(turns).collect();

@@ -18,15 +18,24 @@ pub(super) struct Turns {
     triangles: Vec<[u32; 3]>,
     corners: VertexCorners,
     reference: Vec<ReferenceTriangle>,
+    /// By what the triangles count.
+    areas: Vec<f64>,
 }
 
 impl Turns {
-    /// For a ghost whose first key is `reference`, 3G positions.
-    pub(super) fn new(triangles: &[[u32; 3]], reference: &[f64]) -> Self {
+    /// For a ghost whose first key is `reference`, 3G positions; triangles count by area, and by `weights`
+    /// unless there are none.
+    pub(super) fn new(triangles: &[[u32; 3]], reference: &[f64], weights: &[f64]) -> Self {
+        let rest = reference_triangles(triangles, reference).to_vec();
+        let mut areas: Vec<f64> = rest.iter().map(ReferenceTriangle::area).collect();
+        for (area, weight) in areas.iter_mut().zip(weights) {
+            *area *= weight;
+        }
         Turns {
             triangles: triangles.to_vec(),
             corners: VertexCorners::new(reference.len() / 3, triangles),
-            reference: reference_triangles(triangles, reference).to_vec(),
+            reference: rest,
+            areas,
         }
     }
 
@@ -58,7 +67,7 @@ impl Turns {
                         rotation: rotation.into_inner(),
                         stretch,
                     };
-                    Some((self.reference[face].area(), turn))
+                    Some((self.areas[face], turn))
                 });
                 mean(around)
             })
@@ -140,7 +149,7 @@ mod tests {
             [0.0, 1.0, 0.1],
             [1.0, 1.2, 0.0],
         ];
-        let turns = Turns::new(&[[0, 1, 2], [1, 3, 2]], points.as_flattened());
+        let turns = Turns::new(&[[0, 1, 2], [1, 3, 2]], points.as_flattened(), &[]);
         let turn = exp(&Vector3::new(1.0, 2.0, -0.5));
         let shape: Vec<f64> = points
             .iter()

@@ -120,8 +120,8 @@ mod functions {
     /// as a pose that is reached within 24 frames, two poses, or from a sequence. tension, continuity and
     /// bias, from -1 to 1, are one number or one a key; overshoot (0, 0.1, ..) is the share of the range
     /// of two neighbouring keys by which a coordinate may leave it. Splines of a mesh of more than 20 000
-    /// faces run on a ghost mesh of 2000: ghost is another number of faces or "off", lift "solve" or
-    /// "direct", residual false leaves out at the keys what the ghost cannot carry.
+    /// faces run on a ghost mesh of 2000: ghost is another number of faces or "off", lift "solve",
+    /// "transfer" or "direct", residual false leaves out at the keys what the ghost cannot carry.
     ///
     /// ```rhai
     /// let keys = demo("bar").slice(1, 3);
