@@ -239,6 +239,42 @@ fn a_motion_beyond_a_half_turn_reaches_its_examples() {
     }
 }
 
+#[test]
+fn a_loom_about_another_pose_draws_its_branches_from_frame_to_frame() {
+    let (source, points) = tube(24, 8, 0.4);
+    let (target, others) = tube(19, 10, 0.3);
+    let bends = [0.0, 4.0, 8.0];
+    let poses = |topology: &Arc<Topology>, points: &[f64]| {
+        sequence(topology, &bends.map(|bend| posed(points, bend, 0.0)))
+    };
+    let examples = Examples::new(poses(&source, &points), poses(&target, &others)).unwrap();
+    // from the far end, the reference pose in the middle of the motion, and back
+    let motion = [8, 7, 6, 5, 4, 3, 2, 1, 0, 2, 4, 6, 8];
+    let frames: Vec<Vec<f64>> = motion
+        .iter()
+        .map(|&bend| posed(&points, f64::from(bend), 0.0))
+        .collect();
+    for space in SPACES {
+        let loom = exact(&sequence(&source, &frames), space.name);
+        let found = transfer(&loom, &examples, &Task::default()).unwrap().output;
+        for (frame, example) in [(0, 2), (4, 1), (8, 0), (10, 1), (12, 2)] {
+            let shape = found.loom.at((frame + 1) as f64).unwrap();
+            let error = farthest(&shape, &posed_f32(&others, bends[example]));
+            assert!(
+                error < 4.0 * ROUNDING,
+                "{}, frame {frame}: {error}",
+                space.name
+            );
+        }
+        // rotations grow with the bend, so a frame between examples is their blend but for the stretch of a
+        // bend; a rotation whole turns away would leave most of it outside
+        if ["gradients", "patch-lri"].contains(&space.name) {
+            let worst = found.coverage.iter().copied().fold(0.0, f64::max);
+            assert!(worst < 0.25, "{}: {:?}", space.name, found.coverage);
+        }
+    }
+}
+
 fn posed_f32(points: &[f64], bend: f64) -> Vec<f32> {
     let pose = posed(points, bend, 0.0);
     pose.into_iter().map(|x| x as f32).collect()

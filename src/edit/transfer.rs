@@ -6,7 +6,8 @@
 //! q_0 + H y + rest with y = H^+ (z - q_0). The target's shape is r_0 + sum_j y_j (r_j - r_0): so h
 //! becomes that, and g becomes p -> H^+ (h(g(p)) - q_0). Where the loom's own coordinates are those
 //! about q_0 this is an affine change of g's coefficients; else the coordinates about q_0 of the loom's
-//! shapes at its frames and sites are fitted again with the same sites. f is not touched.
+//! shapes at its frames and sites are fitted again with the same sites, the branches of their rotations
+//! drawn from frame to frame as in a sequence. f is not touched.
 
 use std::sync::Arc;
 
@@ -39,6 +40,10 @@ const OUTSIDE: f64 = 0.5;
 /// An example whose distance from a frame falls below this part of itself when it takes the frame's branches
 /// is that frame, whole turns away.
 const BRANCHES: f64 = 0.5;
+
+/// Where the loom's sites miss the shapes that the examples see by more than this (relative), the new map
+/// takes sites at frames too: the sites of an ordered fit serve its own coordinates.
+const MISSED: f64 = 1e-3;
 
 /// Distances from the reference pose below this part of the farthest example's are none.
 const AT_REST: f64 = 1e-3;
@@ -94,11 +99,14 @@ pub struct Transferred {
 /// the target; the task was cancelled.
 pub fn transfer(loom: &Loom, examples: &Examples, task: &Task) -> Result<Warned<Transferred>> {
     task.phase("examples", 2);
-    let map = Map::new(loom, examples, task)?;
+    same_faces(loom, &examples.sources)?;
+    let sources = positions(&examples.sources);
+    let sight = Sight::new(loom, &sources)?;
+    let map = Map::new(&sight, &sources, examples, task)?;
     let mut warnings = map.warnings();
     task.phase("transfer", loom.frames());
-    let frames = map.frames(loom, task)?;
-    let pose = map.pose(loom, &frames, task)?;
+    let frames = map.frames(&sight, task)?;
+    let pose = map.pose(&sight, &frames)?;
     warnings.extend(outside(&frames.coverage));
     let loom = map.loom(loom, pose)?;
     Ok(Warned {
@@ -110,13 +118,96 @@ pub fn transfer(loom: &Loom, examples: &Examples, task: &Task) -> Result<Warned<
     })
 }
 
+/// A loom's shapes in coordinates about q_0.
+struct Sight<'a> {
+    loom: &'a Loom,
+    space: Arc<dyn ShapeSpace>,
+    /// Whether the loom's own coordinates are those about q_0.
+    own: bool,
+    /// The frame (from 0) nearest q_0, from which branches are drawn where the coordinates are not its own.
+    start: usize,
+}
+
+impl<'a> Sight<'a> {
+    fn new(loom: &'a Loom, sources: &[Vec<f64>]) -> Result<Self> {
+        let own = loom.space().is_identity() || loom.space().state().reference == sources[0];
+        let (space, start) = match own {
+            true => (Arc::clone(loom.space()), 0),
+            false => (
+                open(loom.topology(), loom.space().name(), sources)?,
+                nearest_frame(loom, &sources[0])?,
+            ),
+        };
+        Ok(Sight {
+            loom,
+            space,
+            own,
+            start,
+        })
+    }
+
+    /// The shape at a place of the map, its branches nearest those of `near` where they are not the loom's.
+    fn at(&self, p: Point, near: Option<&[f64]>) -> Vec<f64> {
+        let z = coordinates_at(self.loom, p);
+        if self.own {
+            return z;
+        }
+        let mut shape = vec![0.0; 3 * self.loom.topology().vertices()];
+        self.loom.space().decode(&z, &mut shape);
+        let mut seen = encoded(&*self.space, &shape);
+        if let Some(near) = near {
+            self.space.follow(near, &mut seen);
+        }
+        seen
+    }
+
+    /// Shows every frame (from 0), each with the branches of its neighbour: from `start` to the end, then
+    /// back to the beginning.
+    fn each_frame(&self, task: &Task, mut show: impl FnMut(usize, &[f64])) -> Result<()> {
+        let mut first: Option<Vec<f64>> = None;
+        let forth = self.start..self.loom.frames();
+        let mut before: Option<Vec<f64>> = None;
+        for frame in forth.chain((0..self.start).rev()) {
+            task.check()?;
+            if frame + 1 == self.start {
+                before = first.take();
+            }
+            let z = self.at(self.place(frame)?, before.as_deref());
+            show(frame, &z);
+            if frame == self.start {
+                first = Some(z.clone());
+            }
+            before = Some(z);
+        }
+        Ok(())
+    }
+
+    /// Where a frame (from 0) lies in the map.
+    fn place(&self, frame: usize) -> Result<Point> {
+        self.loom.position_at((frame + 1) as f64)
+    }
+}
+
+/// The frame of a loom (from 0) whose coordinates are nearest those of a shape, whole turns apart.
+fn nearest_frame(loom: &Loom, shape: &[f64]) -> Result<usize> {
+    let wanted = encoded(&**loom.space(), shape);
+    let mut nearest = (f64::INFINITY, 0);
+    for frame in 0..loom.frames() {
+        let z = coordinates_at(loom, loom.position_at((frame + 1) as f64)?);
+        let mut followed = wanted.clone();
+        loom.space().follow(&z, &mut followed);
+        let found = distance(&z, &followed);
+        if found < nearest.0 {
+            nearest = (found, frame);
+        }
+    }
+    Ok(nearest.1)
+}
+
 /// From coordinates of the source to those of the target.
 struct Map {
     topology: Arc<Topology>,
-    source: Arc<dyn ShapeSpace>,
     target: Arc<dyn ShapeSpace>,
-    /// Whether the loom's own coordinates are those about q_0.
-    same: bool,
     q0: Vec<f64>,
     differences: PivotedQr,
     /// The largest |q_j - q_0|.
@@ -134,39 +225,25 @@ struct Frames {
     /// y, m numbers a frame.
     coordinates: Vec<f64>,
     coverage: Vec<f64>,
+    /// The sites where the loom's own coordinates are others, and their y.
+    beside: Vec<Point>,
+    of_beside: Vec<f64>,
 }
 
 impl Map {
-    fn new(loom: &Loom, examples: &Examples, task: &Task) -> Result<Self> {
-        let found = examples.sources.topology();
-        if !found.same_connectivity(loom.topology()) {
-            let (v, w) = (found.vertices(), loom.topology().vertices());
-            return Diagnostic::error(format!(
-                "the source examples have other faces than the loom ({v} and {w} vertices)"
-            ))
-            .hint("source examples are shapes of the loom's own mesh; are the lists the right way round?")
-            .err();
-        }
-        let (sources, targets) = (positions(&examples.sources), positions(&examples.targets));
-        let name = loom.space().name();
-        let state = loom.space().state();
-        let same = loom.space().is_identity() || state.reference == sources[0];
-        let source = match same {
-            true => Arc::clone(loom.space()),
-            false => open(loom.topology(), name, &sources)?,
-        };
+    fn new(sight: &Sight, sources: &[Vec<f64>], examples: &Examples, task: &Task) -> Result<Self> {
+        let source = &*sight.space;
         task.step();
+        let targets = positions(&examples.targets);
         let topology = Arc::clone(examples.targets.topology());
-        let target = open(&topology, name, &targets)?;
+        let target = open(&topology, source.name(), &targets)?;
         task.check()?;
         task.step();
-        let mut q: Vec<Vec<f64>> = sources.iter().map(|q| encoded(&*source, q)).collect();
-        if same {
-            take_branches_of(loom, &*source, &mut q, task)?;
-        }
+        let mut q: Vec<Vec<f64>> = sources.iter().map(|q| encoded(source, q)).collect();
+        take_branches_of(sight, &mut q, task)?;
         let mut r: Vec<Vec<f64>> = targets.iter().map(|r| encoded(&*target, r)).collect();
         for (q, r) in q.iter().zip(&mut r) {
-            align_mean_rotation((&*source, q), (&*target, r));
+            align_mean_rotation((source, q), (&*target, r));
         }
         let moved = minus_first(&q);
         let differences = PivotedQr::new(&moved, SAME);
@@ -175,14 +252,12 @@ impl Map {
         }
         Ok(Map {
             topology,
-            same,
             reach: moved.iter().map(|q| norm(q)).fold(0.0, f64::max),
             bodies: [body(&sources[0]), body(&targets[0])],
             vectors: minus_first(&r).concat(),
             q0: q.into_iter().next().unwrap_or_default(),
             r0: r.into_iter().next().unwrap_or_default(),
             differences,
-            source,
             target,
         })
     }
@@ -208,56 +283,59 @@ impl Map {
         (y, distance / norm(&from).max(AT_REST * self.reach))
     }
 
-    /// The loom's shape at a place of its map, in coordinates about q_0.
-    fn seen(&self, loom: &Loom, p: Point) -> Vec<f64> {
-        let z = coordinates_at(loom, p);
-        if self.same {
-            return z;
-        }
-        let mut shape = vec![0.0; 3 * loom.topology().vertices()];
-        loom.space().decode(&z, &mut shape);
-        encoded(&*self.source, &shape)
-    }
-
-    fn frames(&self, loom: &Loom, task: &Task) -> Result<Frames> {
+    fn frames(&self, sight: &Sight, task: &Task) -> Result<Frames> {
+        let positions: Result<Vec<Point>> = (0..sight.loom.frames())
+            .map(|frame| sight.place(frame))
+            .collect();
+        let positions = positions?;
+        let sites = sites_by_frame(sight.loom.pose().sites(), &positions);
+        let width = self.differences.novelty().len();
         let mut frames = Frames {
-            positions: Vec::new(),
-            coordinates: Vec::new(),
-            coverage: Vec::new(),
+            coordinates: vec![0.0; positions.len() * width],
+            coverage: vec![0.0; positions.len()],
+            positions,
+            beside: Vec::new(),
+            of_beside: Vec::new(),
         };
-        for frame in 1..=loom.frames() {
-            task.check()?;
-            let p = loom.position_at(frame as f64)?;
-            let (y, coverage) = self.coordinates(&self.seen(loom, p));
-            frames.positions.push(p);
-            frames.coordinates.extend(y);
-            frames.coverage.push(coverage);
+        sight.each_frame(task, |frame, z| {
+            let (y, coverage) = self.coordinates(z);
+            frames.coordinates[frame * width..][..width].copy_from_slice(&y);
+            frames.coverage[frame] = coverage;
+            if !sight.own {
+                for &site in &sites[frame] {
+                    let seen = sight.at(site, Some(z));
+                    frames.beside.push(site);
+                    frames.of_beside.extend(self.coordinates(&seen).0);
+                }
+            }
             task.step();
-        }
+        })?;
         Ok(frames)
     }
 
     /// p -> H^+ (h(g(p)) - q_0).
-    fn pose(&self, loom: &Loom, frames: &Frames, task: &Task) -> Result<PoseSignal> {
-        if self.same {
+    fn pose(&self, sight: &Sight, frames: &Frames) -> Result<PoseSignal> {
+        let loom = sight.loom;
+        if sight.own {
             return Ok(self.affine(loom));
         }
-        let mut positions = frames.positions.clone();
-        let mut targets = frames.coordinates.clone();
-        for &site in loom.pose().sites() {
-            task.check()?;
-            positions.push(site);
-            targets.extend(self.coordinates(&self.seen(loom, site)).0);
-        }
         let rows = Rows {
-            positions: &positions,
-            targets: &targets,
+            positions: &[&frames.positions[..], &frames.beside].concat(),
+            targets: &[&frames.coordinates[..], &frames.of_beside].concat(),
             width: self.differences.novelty().len(),
             weights: None,
         };
-        let pose = thin_plate::fit(&rows, loom.pose().sites())
-            .and_then(|plate| PoseSignal::new(plate, loom.pose().site_frames().to_vec()));
-        pose.map_err(|_| Box::new(Diagnostic::error("the loom's shapes are not finite")))
+        let sites = loom.pose().sites();
+        let fitted = thin_plate::fit(&rows, sites)
+            .and_then(|plate| PoseSignal::new(plate, loom.pose().site_frames().to_vec()))
+            .and_then(|pose| match missed(&pose, &rows) > MISSED {
+                true => {
+                    let more = between(sites, &frames.positions);
+                    PoseSignal::new(thin_plate::fit(&rows, &more)?, Vec::new())
+                }
+                false => Ok(pose),
+            });
+        fitted.map_err(|_| Box::new(Diagnostic::error("the loom's shapes are not finite")))
     }
 
     /// The same as an affine change of g's values: H^+ H_old g + H^+ (h_0 - q_0).
@@ -338,6 +416,20 @@ fn positions(sequence: &Sequence) -> Vec<Vec<f64>> {
     (0..sequence.frames()).map(frame).collect()
 }
 
+/// Source examples are shapes of the loom's own mesh.
+fn same_faces(loom: &Loom, sources: &Sequence) -> Result<()> {
+    let found = sources.topology();
+    if found.same_connectivity(loom.topology()) {
+        return Ok(());
+    }
+    let (v, w) = (found.vertices(), loom.topology().vertices());
+    Diagnostic::error(format!(
+        "the source examples have other faces than the loom ({v} and {w} vertices)"
+    ))
+    .hint("source examples are shapes of the loom's own mesh; are the lists the right way round?")
+    .err()
+}
+
 /// The space about the first of some shapes.
 fn open(topology: &Arc<Topology>, name: &str, shapes: &[Vec<f64>]) -> Result<Arc<dyn ShapeSpace>> {
     let rows: Vec<&[f64]> = shapes.iter().map(Vec::as_slice).collect();
@@ -363,31 +455,75 @@ fn coordinates_at(loom: &Loom, p: Point) -> Vec<f64> {
 /// Gives examples that are frames of the loom the branches of those frames. A sequence draws the branches
 /// of its rotations from frame to frame, an example has principal ones: the same shape may lie whole turns
 /// away. An example that no frame comes near but for branches keeps its own.
-fn take_branches_of(
-    loom: &Loom,
-    space: &dyn ShapeSpace,
-    examples: &mut [Vec<f64>],
-    task: &Task,
-) -> Result<()> {
+fn take_branches_of(sight: &Sight, examples: &mut [Vec<f64>], task: &Task) -> Result<()> {
     let mut found: Vec<(f64, Option<Vec<f64>>)> = vec![(f64::INFINITY, None); examples.len()];
-    for frame in 1..=loom.frames() {
-        task.check()?;
-        let z = coordinates_at(loom, loom.position_at(frame as f64)?);
+    sight.each_frame(task, |_, z| {
         for (example, found) in examples.iter().zip(&mut found).skip(1) {
             let mut followed = example.clone();
-            space.follow(&z, &mut followed);
-            let (after, before) = (distance(&z, &followed), distance(&z, example));
+            sight.space.follow(z, &mut followed);
+            let (after, before) = (distance(z, &followed), distance(z, example));
             if after < BRANCHES * before && after < found.0 {
                 *found = (after, Some(followed));
             }
         }
-    }
+    })?;
     for (example, (_, followed)) in examples.iter_mut().zip(found) {
         if let Some(followed) = followed {
             *example = followed;
         }
     }
     Ok(())
+}
+
+/// The root mean square by which a pose signal misses rows, relative to the rows.
+fn missed(pose: &PoseSignal, rows: &Rows) -> f64 {
+    let mut y = vec![0.0; rows.width];
+    let (mut off, mut size) = (0.0, 0.0);
+    for (&p, wanted) in rows
+        .positions
+        .iter()
+        .zip(rows.targets.chunks_exact(rows.width))
+    {
+        pose.evaluate(p, &mut y);
+        off += distance(&y, wanted).powi(2);
+        size += norm(wanted).powi(2);
+    }
+    if size > 0.0 { (off / size).sqrt() } else { 0.0 }
+}
+
+/// Sites and those places of frames that are at least half a step of the motion from each of them and from
+/// each other: what lies closer, as strides laid over each other do, is for the least squares to even out.
+fn between(sites: &[Point], frames: &[Point]) -> Vec<Point> {
+    let mut steps: Vec<f64> = frames
+        .windows(2)
+        .map(|pair| apart(&pair[0], &pair[1]))
+        .collect();
+    steps.sort_by(f64::total_cmp);
+    let least = 0.5 * steps.get(steps.len() / 2).copied().unwrap_or(0.0);
+    let mut more = sites.to_vec();
+    for frame in frames {
+        if more.iter().all(|site| apart(site, frame) > least) {
+            more.push(*frame);
+        }
+    }
+    more
+}
+
+/// Sites of a map by the frame whose place is nearest.
+fn sites_by_frame(sites: &[Point], places: &[Point]) -> Vec<Vec<Point>> {
+    let mut by_frame = vec![Vec::new(); places.len()];
+    for &site in sites {
+        let from = |frame: &usize| apart(&places[*frame], &site);
+        let nearest = (0..places.len()).min_by(|a, b| from(a).total_cmp(&from(b)));
+        nearest
+            .into_iter()
+            .for_each(|frame| by_frame[frame].push(site));
+    }
+    by_frame
+}
+
+fn apart(a: &Point, b: &Point) -> f64 {
+    libm::hypot(a[0] - b[0], a[1] - b[1])
 }
 
 fn distance(a: &[f64], b: &[f64]) -> f64 {
