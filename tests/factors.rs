@@ -52,7 +52,7 @@ fn made<T>(work: impl FnOnce() -> T) -> (T, usize) {
 }
 
 /// The factors that one mesh and reference pose need: one for positions or rotations, or one for each.
-const NEEDED: [(&str, usize); 3] = [("gradients", 1), ("patch-lri", 2), ("lri", 1)];
+const NEEDED: [(&str, usize); 3] = [("gradients", 1), ("patch-lri", 2), ("lri", 2)];
 
 fn loom_of(capture: &Sequence, space: &str) -> Loom {
     let options = FitOptions {

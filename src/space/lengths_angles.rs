@@ -9,7 +9,9 @@
 //! Decoding: lengths give each triangle its shape, angles the rotation between neighbours; all
 //! rotations follow from these ([`RotationGraph`]), positions from one Poisson solve. Lengths and
 //! angles of a shape are met by that already. Those between shapes contradict each other: then
-//! Gauss-Newton steps on the positions (sparse Cholesky, analysed once) bring both residuals down.
+//! Gauss-Newton steps on the positions (sparse Cholesky, analysed once) bring both residuals down. Where
+//! slivers fold, their angles are so far from linear in the positions that such steps are refused; after
+//! two of them the linear solution stays.
 //!
 //! Degenerate input: a triangle without a plane takes a normal as in [`super::Gradients`]; an edge of
 //! no length has no angle, and where nothing else joins its triangles the rotation between them is lost.
@@ -22,7 +24,7 @@ use rayon::prelude::*;
 
 use super::orientation::{group_rotations, polar_factors};
 use super::placement::{Placement, blocks_from, triple};
-use super::refine::{Fold, Refine, Span};
+use super::refine::{Fold, Refine, Span, Wanted};
 use super::registry::State;
 use super::scales::Scales;
 use super::{Block, Invariance, LARGE_TURN, ShapeSpace, SpaceError};
@@ -97,7 +99,8 @@ impl LengthsAngles {
         let weights = shares.iter().map(|share| share * share).collect();
         let components = poisson.analysis().components().clone();
         let mut space = LengthsAngles {
-            graph: RotationGraph::new(faces, links, weights)?,
+            graph: RotationGraph::new(faces, links, weights)
+                .map_err(|error| SpaceError::of_rotations(error, "triangle"))?,
             placement: Placement::new(components, &areas, &scales),
             length: scales.size() / (typical * (lengths.len().max(1) as f64).sqrt()),
             angle: scales.rotation(),
@@ -273,7 +276,11 @@ impl LengthsAngles {
         let length = |edge: usize| (bare[edge] / weight).max(0.0);
         let angles = &coordinates[lengths..placement];
         let angle = |hinge: usize| angles[hinge] / (self.angle * self.shares[hinge]);
-        if !refine.run(&length, &angle, positions) {
+        let wanted = Wanted {
+            length: &length,
+            angle: &angle,
+        };
+        if !refine.run(&wanted, positions) {
             return;
         }
         let mut polars = Vec::new();

@@ -11,8 +11,9 @@
 //!
 //! Decoding: the vectors around an edge, seen from both its ends, give the rotation between the two
 //! frames (Procrustes); all frames follow from these ([`RotationGraph`]), all positions from the frames
-//! (v_j - v_i = F_i c_ij in the least-squares sense). Both systems are the Laplacian of the edges, which
-//! is factored once.
+//! (v_j - v_i = F_i c_ij in the least-squares sense). Both systems are Laplacians of the edges. That of
+//! the frames trusts an edge as far as the vectors around it keep off a line in the reference pose: between
+//! slivers, rotations are noise that would add up along a limb.
 //!
 //! Degenerate input: a vertex whose triangles cancel (one and its copy turned over) takes its normal
 //! from two of its edges; one whose edges are all parallel any perpendicular one, which its coordinates
@@ -37,6 +38,9 @@ use crate::mesh::{Components, Hinges, NO_EDGE, PoissonAnalysis, ReferenceTriangl
 /// Edges or vertices that one thread takes at a time.
 const CHUNK: usize = 1024;
 
+/// An edge is trusted at least so much in the system of the frames.
+const LEAST_TRUST: f64 = 1e-4;
+
 /// Below this [`nearest`] certainty an edge does not tell the rotation between its frames.
 const PARALLEL: f64 = 1e-6;
 
@@ -46,7 +50,10 @@ pub struct Lri {
     reference: Arc<[f64]>,
     rest: Arc<[ReferenceTriangle]>,
     hinges: Arc<Hinges>,
+    /// Positions from the vectors of the edges.
     graph: RotationGraph,
+    /// Frames from the rotations across the edges.
+    turns: RotationGraph,
     /// Sides at each edge: those of edge e are `sides[starts[e]..starts[e + 1]]`.
     starts: Vec<u32>,
     sides: Vec<u32>,
@@ -88,8 +95,12 @@ impl Lri {
             .sum();
         let (group, shares) = triangle_groups(triangles, components, &rest);
         let (starts, sides) = sides_of_edges(&hinges);
+        let graph =
+            |weights: Vec<f64>| RotationGraph::on(analysis.symbolic(), edges.to_vec(), weights);
+        let trust = trust(edges, (&starts, &sides), triangles, &reference);
         let mut space = Lri {
-            graph: RotationGraph::on(analysis.symbolic(), edges.to_vec(), vec![1.0; edges.len()])?,
+            graph: graph(vec![1.0; edges.len()])?,
+            turns: graph(trust)?,
             placement: Placement::new(components.clone(), &shares, &scales),
             weight: match squares > 0.0 {
                 true => scales.size() / (2.0 * squares).sqrt(),
@@ -373,12 +384,44 @@ impl ShapeSpace for Lri {
             .map(|edge| self.between(vectors, edge))
             .unzip_into_vecs(relative, certain);
         frames.resize(positions.len() / 3, UnitQuaternion::identity());
-        self.graph.solve(relative, &|edge| certain[edge], frames);
+        self.turns.solve(relative, &|edge| certain[edge], frames);
         self.positions(vectors, &mut workspace, positions);
         self.lock().push(workspace);
         self.orient(placement, positions);
         self.placement.decode(placement, positions);
     }
+}
+
+/// How far the vectors around each edge keep off a line, squared: (l2 + l3) / l1 of the eigenvalues of their
+/// second moments.
+fn trust(
+    edges: &[[u32; 2]],
+    (starts, sides): (&[u32], &[u32]),
+    triangles: &[[u32; 3]],
+    positions: &[f64],
+) -> Vec<f64> {
+    let of = |edge: usize| {
+        let [a, b] = edges[edge].map(|vertex| point(positions, vertex));
+        let square = |v: Vector3<f64>| v * v.transpose();
+        let range = starts[edge] as usize..starts[edge + 1] as usize;
+        let corners = sides[range].iter().map(|&side| {
+            let corner = triangles[(side / 3) as usize][(side as usize % 3 + 2) % 3];
+            let c = point(positions, corner);
+            square(c - a) + square(c - b)
+        });
+        let moments = square(b - a) + corners.sum::<Matrix3<f64>>();
+        let values = moments.symmetric_eigenvalues();
+        let off = (values.sum() - values.max()) / values.max();
+        match off.is_finite() {
+            true => (off * off).max(LEAST_TRUST),
+            false => LEAST_TRUST,
+        }
+    };
+    (0..edges.len())
+        .into_par_iter()
+        .with_min_len(CHUNK)
+        .map(of)
+        .collect()
 }
 
 /// The position of a vertex.
