@@ -80,6 +80,9 @@ pub enum SpaceError {
     Singular {
         /// A vertex of the part of the mesh that nothing holds.
         vertex: usize,
+        /// Which of the mesh's connected parts it lies in and how many there are, where they were told
+        /// apart.
+        part: Option<[usize; 2]>,
     },
     /// The factors do not fit in memory.
     TooLarge,
@@ -93,12 +96,18 @@ pub enum SpaceError {
 impl fmt::Display for SpaceError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            SpaceError::Singular { vertex } => {
+            SpaceError::Singular { vertex, part } => {
                 write!(
                     f,
                     "the position system is singular at vertex {}",
                     vertex + 1
-                )
+                )?;
+                match part {
+                    Some([part, parts]) if *parts > 1 => {
+                        write!(f, ", in part {} of {parts}", part + 1)
+                    }
+                    _ => Ok(()),
+                }
             }
             SpaceError::TooLarge => f.write_str("the mesh is too large for this machine"),
             SpaceError::Unsuitable { reason } => f.write_str(reason),
@@ -113,7 +122,7 @@ impl From<SpaceError> for Box<Diagnostic> {
     fn from(error: SpaceError) -> Self {
         let diagnostic = Diagnostic::error(error.to_string());
         Box::new(match error {
-            SpaceError::Singular { vertex } => diagnostic
+            SpaceError::Singular { vertex, .. } => diagnostic
                 .at_vertex(vertex + 1)
                 .hint("the reference pose has numbers there that are not finite or far too large"),
             SpaceError::TooLarge | SpaceError::Unsuitable { .. } => diagnostic,
@@ -121,12 +130,28 @@ impl From<SpaceError> for Box<Diagnostic> {
     }
 }
 
+impl SpaceError {
+    /// Why there is no system for the rotations of `nodes` ("patch", ..), which are no vertices.
+    fn of_rotations(error: SparseError, nodes: &str) -> Self {
+        match error {
+            SparseError::TooLarge => SpaceError::TooLarge,
+            SparseError::NotPositiveDefinite { unknown } => SpaceError::Unsuitable {
+                reason: format!(
+                    "the system of rotations is singular at {nodes} {}",
+                    unknown + 1
+                ),
+            },
+        }
+    }
+}
+
 impl From<SparseError> for SpaceError {
     fn from(error: SparseError) -> Self {
         match error {
-            SparseError::NotPositiveDefinite { unknown } => {
-                SpaceError::Singular { vertex: unknown }
-            }
+            SparseError::NotPositiveDefinite { unknown } => SpaceError::Singular {
+                vertex: unknown,
+                part: None,
+            },
             SparseError::TooLarge => SpaceError::TooLarge,
         }
     }

@@ -7,8 +7,9 @@ use super::living::Living;
 use super::patch_lri::CoarsePatchLri;
 use super::patching::{self, Fine, FinePatches, Patching};
 use super::{Block, Gradients, LengthsAngles, Lri, PatchLri, ShapeSpace, SpaceError, Vertices};
+use crate::math::sparse::SparseError;
 use crate::mesh::{
-    Hinges, Poisson, PoissonAnalysis, ReferenceTriangle, Topology, reference_triangles,
+    Components, Hinges, Poisson, PoissonAnalysis, ReferenceTriangle, Topology, reference_triangles,
     usual_patches,
 };
 
@@ -257,6 +258,7 @@ impl Spaces {
         if kind.shared == Sharing::Never {
             return build();
         }
+        self.check_reference()?;
         let fits = |made: &Made, space: &(dyn ShapeSpace + 'static)| {
             made.kind == kind.name
                 && made.reference == self.reference
@@ -270,6 +272,23 @@ impl Spaces {
             poses,
         };
         SPACES_IN_USE.find_or(fits, || Ok((made(), build()?)))
+    }
+
+    /// No system of a space whose reference pose has numbers that are not finite can be solved.
+    fn check_reference(&self) -> Result<(), SpaceError> {
+        match self.reference.iter().position(|x| !x.is_finite()) {
+            None => Ok(()),
+            Some(at) => Err(self.singular(at / 3)),
+        }
+    }
+
+    /// The error at a vertex, with the part of the mesh that it lies in.
+    fn singular(&self, vertex: usize) -> SpaceError {
+        let parts = Components::new(self.vertices(), self.topology.triangles());
+        SpaceError::Singular {
+            vertex,
+            part: Some([parts.part()[vertex] as usize, parts.count()]),
+        }
     }
 
     /// Spaces about the reference pose of a stored space.
@@ -321,7 +340,11 @@ impl Spaces {
                 Arc::ptr_eq(found.analysis(), &analysis) && found.reference()[..] == rest[..]
             };
             let (analysis, rest) = (Arc::clone(&analysis), Arc::clone(&rest));
-            let factor = || Ok(((), Arc::new(Poisson::new(analysis, rest)?)));
+            let factor = || match Poisson::new(analysis, rest) {
+                Ok(poisson) => Ok(((), Arc::new(poisson))),
+                Err(SparseError::NotPositiveDefinite { unknown }) => Err(self.singular(unknown)),
+                Err(error) => Err(error.into()),
+            };
             SYSTEMS_IN_USE.find_or(same, factor)
         };
         self.poisson.get_or_init(init).clone()
@@ -411,4 +434,42 @@ fn kind(name: &str) -> Result<&'static SpaceKind, SpaceError> {
             reason: format!("there is no space `{name}`; there are {}", known.join(", ")),
         }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reference_pose_that_no_system_can_hold_names_its_vertex_and_part() {
+        // two triangles apart, their vertices taking turns
+        let triangles = [[0, 2, 4], [1, 3, 5]];
+        let topology = Arc::new(Topology::from_triangles(6, &triangles).unwrap());
+        let pose = |scale: f64, bad: Option<(usize, f64)>| {
+            let mut pose: Vec<f64> = (0..18).map(|i| scale * ((i * i) % 7) as f64).collect();
+            bad.into_iter().for_each(|(at, x)| pose[at] = x);
+            pose
+        };
+        for kind in SPACES {
+            let open = |pose: &[f64]| Spaces::new(Arc::clone(&topology), pose).open(kind.name, &[]);
+            assert!(open(&pose(1.0, None)).is_ok(), "{}", kind.name);
+            if kind.shared == Sharing::Never {
+                continue;
+            }
+            for bad in [f64::NAN, f64::INFINITY] {
+                let error = open(&pose(1.0, Some((3 * 5 + 1, bad)))).err().unwrap();
+                let expected = SpaceError::Singular {
+                    vertex: 5,
+                    part: Some([1, 2]),
+                };
+                assert_eq!(error, expected, "{}", kind.name);
+                let told: Box<crate::diag::Diagnostic> = error.into();
+                assert!(
+                    told.message.contains("vertex 6, in part 2 of 2"),
+                    "{told:?}"
+                );
+                assert!(!told.hints.is_empty());
+            }
+        }
+    }
 }

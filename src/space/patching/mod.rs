@@ -105,7 +105,8 @@ impl Patching {
                 group: groups.part()[patch] as usize,
             })
             .collect();
-        let graph = RotationGraph::new(count, links.clone(), weights.clone())?;
+        let graph = RotationGraph::new(count, links.clone(), weights.clone())
+            .map_err(|error| SpaceError::of_rotations(error, "patch"))?;
         Ok(Patching {
             pair_shares: pair_shares(&graph, weights, &patches, groups.count()),
             joints,
