@@ -97,41 +97,48 @@ fn decode_undoes_encode_at_any_scale_and_far_from_the_origin() {
 
 #[test]
 fn decode_undoes_encode_on_real_captures() {
-    for folder in captures::folders() {
-        check_round_trip(&captures::read(&folder, 1));
+    captures::each(4, check_round_trip);
+}
+
+/// The first pose and others, moved far and turned.
+fn check_rigid_copies(case: &Case) {
+    for space in spaces_of(case) {
+        if space.invariance() == Invariance::None {
+            continue;
+        }
+        for pose in &case.poses {
+            let far = size(pose) / 4.0;
+            let copy = mapped(&turned(pose, [1.0, -2.0, 0.5], 2.4), |p| {
+                [p[0] + 3.0 * far, p[1] - far, p[2] + 0.5 * far]
+            });
+            let (a, b) = (encoded(&*space, pose), encoded(&*space, &copy));
+            for block in space.blocks() {
+                if [MEAN_ROTATION, MEAN_VERTEX].contains(&block.name) {
+                    continue;
+                }
+                for at in block.range.clone() {
+                    let difference = (a[at] - b[at]).abs() / block.weight;
+                    assert!(
+                        difference <= 1e-9,
+                        "{}: {}, {} at {at}: {difference:e}",
+                        case.name,
+                        space.name(),
+                        block.name
+                    );
+                }
+            }
+        }
     }
 }
 
 #[test]
 fn coordinates_of_rigid_copies_differ_in_placement_only() {
-    for case in generated() {
-        for space in spaces_of(&case) {
-            if space.invariance() == Invariance::None {
-                continue;
-            }
-            for pose in &case.poses {
-                let copy = mapped(&turned(pose, [1.0, -2.0, 0.5], 2.4), |p| {
-                    [p[0] + 3.0, p[1] - 1.0, p[2] + 0.5]
-                });
-                let (a, b) = (encoded(&*space, pose), encoded(&*space, &copy));
-                for block in space.blocks() {
-                    if [MEAN_ROTATION, MEAN_VERTEX].contains(&block.name) {
-                        continue;
-                    }
-                    for at in block.range.clone() {
-                        let difference = (a[at] - b[at]).abs() / block.weight;
-                        assert!(
-                            difference <= 1e-9,
-                            "{}: {}, {} at {at}: {difference:e}",
-                            case.name,
-                            space.name(),
-                            block.name
-                        );
-                    }
-                }
-            }
-        }
-    }
+    generated().iter().for_each(check_rigid_copies);
+}
+
+#[test]
+fn coordinates_of_rigid_copies_of_real_captures_differ_in_placement_only() {
+    captures::each(1, check_rigid_copies);
 }
 
 /// The largest change of a distance between vertices: of every vertex to some few that span space.
@@ -148,18 +155,18 @@ fn distortion(a: &[f64], b: &[f64]) -> f64 {
     worst
 }
 
-#[test]
-fn between_a_pose_and_its_turned_copy_lies_a_rigid_motion() {
-    for case in generated() {
-        for space in spaces_of(&case) {
-            let pose = &case.poses[0];
-            let copy = mapped(
-                &turned(pose, [0.2, 1.0, 0.6], 179.0_f64.to_radians()),
-                |p| [p[0] + 1.0, p[1], p[2]],
-            );
-            let (a, b) = (encoded(&*space, pose), encoded(&*space, &copy));
-            let halfway = decoded(&*space, &midway(&a, &b, 0.5), case.topology.vertices());
-            let change = distortion(&halfway, pose) / size(pose);
+fn check_turned_copy(case: &Case) {
+    for space in spaces_of(case) {
+        let pose = &case.poses[0];
+        let shift = size(pose) / 4.0;
+        let copy = mapped(
+            &turned(pose, [0.2, 1.0, 0.6], 179.0_f64.to_radians()),
+            |p| [p[0] + shift, p[1], p[2]],
+        );
+        let (a, b) = (encoded(&*space, pose), encoded(&*space, &copy));
+        for t in [0.3, 0.5] {
+            let between = decoded(&*space, &midway(&a, &b, t), case.topology.vertices());
+            let change = distortion(&between, pose) / size(pose);
             match space.invariance() {
                 Invariance::Rigid => {
                     assert!(change < 1e-6, "{}: {}: {change:e}", case.name, space.name());
@@ -168,6 +175,16 @@ fn between_a_pose_and_its_turned_copy_lies_a_rigid_motion() {
             }
         }
     }
+}
+
+#[test]
+fn between_a_pose_and_its_turned_copy_lies_a_rigid_motion() {
+    generated().iter().for_each(check_turned_copy);
+}
+
+#[test]
+fn between_a_real_pose_and_its_turned_copy_lies_a_rigid_motion() {
+    captures::each(1, check_turned_copy);
 }
 
 #[test]
@@ -289,9 +306,7 @@ fn check_patches(case: &Case) {
 #[test]
 fn there_are_8_to_200_patches_of_ten_triangles_or_more() {
     check_patches(&bar_pair(1.0));
-    for folder in captures::folders() {
-        check_patches(&captures::read(&folder, 2));
-    }
+    captures::each(2, check_patches);
 }
 
 #[test]
