@@ -1,8 +1,9 @@
 //! Shape spaces at the sizes of X19's Table 1: `cargo bench --bench spaces [FACES..]`. Best of several runs.
 //!
 //! For each size what is done once per mesh (analysis and factorisation), one frame encoded and decoded on
-//! all cores, and frames of a batch decoded side by side; beside each its ratio to a plain copy of the
-//! frame's coordinates in the same run. Then a capture of 85 K faces fitted, and three keys of 1.3 M faces
+//! all cores, one decoded on a single core, and frames of a batch decoded side by side with how many times
+//! as fast as on one core that is; beside each its ratio to a plain copy of the frame's coordinates in the
+//! same run. Then a capture of 85 K faces fitted, and three keys of 1.3 M faces
 //! blended in a process of its own, with the most memory that it held. The mesh is a dented torus, its
 //! vertices in rows, bent.
 
@@ -106,20 +107,30 @@ fn per_size(faces: usize, goal: f64) {
         });
         let batch =
             shortest(2 + runs / 10, || decode_batch(&*space, &z, pose.len())) / BATCH as u32;
+        let alone =
+            on_one_core(|| shortest(2 + runs / 4, || space.decode(black_box(&z), &mut shape)));
         let ms = |time: Duration| 1e3 * time.as_secs_f64();
         let times = |time: Duration| ms(time) / ms(plain);
         println!(
-            "  {name:<9} copy {:>8.3} ms; encode {:>8.3} ms {:>5.1} x; decode {:>8.3} ms {:>5.1} x (goal {goal} ms); encode/decode {:.2}; batch {:>8.3} ms a frame {:>5.1} x",
+            "  {name:<9} copy {:>8.3} ms; encode {:>8.3} ms {:>5.1} x; decode {:>8.3} ms {:>5.1} x (goal {goal} ms); encode/decode {:.2}; on one core {:>8.3} ms; batch {:>8.3} ms a frame {:>5.1} x, {:.2} times one core",
             ms(plain),
             ms(encode),
             times(encode),
             ms(decode),
             times(decode),
             ms(encode) / ms(decode),
+            ms(alone),
             ms(batch),
             times(batch),
+            ms(alone) / ms(batch),
         );
     }
+}
+
+/// What `work` gives when it has one thread.
+fn on_one_core<T: Send>(work: impl FnOnce() -> T + Send) -> T {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+    pool.expect("a thread").install(work)
 }
 
 fn decode_batch(space: &dyn ShapeSpace, z: &[f64], width: usize) {

@@ -1,13 +1,18 @@
 //! Figure 4 of Cashman & Hormann 2012: a flag in the wind, 100 frames in the space of deformation gradients
 //! with k = 98, l = 100, m = 79. The wind drives it around in circles, in the map too.
+//!
+//! Fitted both ways. By the paper's (`ch12`) the four control points that k lacks to interpolate shift the
+//! curve by a hundredth of the map, which adds to the error; `ordered` fits curve and map together and leaves
+//! out nothing but what m does. That is much here: the cloth flutters triangle by triangle, and the best 79
+//! modes of its plain positions leave out a hundredth too. The map with its circles is the paper's.
 
 mod support;
 
 use std::process::ExitCode;
 
 use meshloom::diag::Result;
-use meshloom::loom::Loom;
 use meshloom::loom::fit::FitOptions;
+use meshloom::loom::{Errors, Loom};
 use meshloom::mesh::FrameSource;
 use meshloom::pipeline::plot::plot_loom;
 use meshloom::plot::{Anchor, Item, Path, Plane, Rect, Scene, Stroke, Theme, pose_space};
@@ -26,68 +31,87 @@ fn draw(figure: &mut Figure) -> Result<()> {
     let sequence = support::last(&sequence, 100); // once the wind has taken hold of it
     let n = sequence.frames();
     let scaled = |number: usize| number * n / 100; // shorter captures keep the paper's shares of n
-    let loom = support::fit_with(
-        &sequence,
-        [scaled(98).max(4), n.max(3), scaled(79).min(n - 1)],
-        FitOptions {
-            space: "gradients".to_string(),
-            ..FitOptions::ch12()
-        },
-    )?;
-    let positions = loom.report().error.positions.unwrap_or(f64::NAN);
-    let (turns, steadiness) = turning(&loom);
-    let row = |name: &str, paper: &str, here: String| vec![name.into(), paper.into(), here];
+    let kept = [scaled(98).max(4), n.max(3), scaled(79).min(n - 1)];
+    let fitted = |options: FitOptions| {
+        let space = "gradients".to_string();
+        support::fit_with(&sequence, kept, FitOptions { space, ..options })
+    };
+    let looms = [fitted(FitOptions::ch12())?, fitted(FitOptions::default())?];
+    let row = |name: &str, paper: &str, of: &dyn Fn(&Loom) -> String| {
+        let mut row = vec![name.to_string(), paper.to_string()];
+        row.extend(looms.iter().map(of));
+        row
+    };
+    let error = |of: fn(&Errors) -> f64| move |loom: &Loom| percent(of(&loom.report().error));
     table(
-        &["", "paper", "here"],
+        &["", "paper", "ch12", "ordered"],
         &[
-            row("shape space", "R^(9F+3)", "R^(9F+6)".into()),
-            row("dimension d", "51987", loom.space().dimension().to_string()),
-            row("frames n", "100", n.to_string()),
-            row(
-                "control points k",
-                "98",
-                loom.time().controls().len().to_string(),
-            ),
-            row("sites l", "100", loom.pose().sites().len().to_string()),
-            row("modes m", "79", loom.shape().modes().to_string()),
-            row("total error", "", percent(loom.report().error.total)),
-            row("in vertex positions", "", percent(positions)),
-            row(
-                "turns about the middle",
-                "\"circular motion\"",
-                format!("{turns:.1}"),
-            ),
-            row(
-                "turning in one sense",
-                "\"consistent\"",
-                percent(steadiness),
-            ),
+            row("shape space", "R^(9F+3)", &|_| "R^(9F+6)".into()),
+            row("dimension d", "51987", &|loom| {
+                loom.space().dimension().to_string()
+            }),
+            row("frames n", "100", &|_| n.to_string()),
+            row("control points k", "98", &|loom| {
+                loom.time().controls().len().to_string()
+            }),
+            row("sites l", "100", &|loom| {
+                loom.pose().sites().len().to_string()
+            }),
+            row("modes m", "79", &|loom| loom.shape().modes().to_string()),
+            row("of h, in coordinates", "", &error(|error| error.shape)),
+            row("total, in coordinates", "", &error(|error| error.total)),
+            row("in vertex positions", "", &error(positions)),
+            row("turns about the middle", "\"circular motion\"", &|loom| {
+                format!("{:.1}", turning(loom).0)
+            }),
+            row("area swept in one sense", "\"consistent\"", &|loom| {
+                percent(turning(loom).1)
+            }),
         ],
     );
-    figure.goal("vertices are within 3 % of their motion", positions < 0.03);
+    let plain = support::fit_with(&sequence, kept, FitOptions::ch12())?;
+    let floor = plain.report().error.shape;
+    println!("the same modes of vertices leave out {}", percent(floor));
+    let [paper, ordered] = looms;
+    let errors = &ordered.report().error;
     figure.goal(
-        "at least two turns, two fifths of all turning in one sense",
-        turns.abs() >= 2.0 && steadiness >= 0.4,
+        "ordered: k and l add less than a hundredth to what m leaves out",
+        errors.total < 1.01 * errors.shape,
     );
-    figure.picture(&compose(&loom, &view)?)
+    figure.goal(
+        "ordered: vertices err by less than 1.5 times what the best modes of vertices leave out",
+        positions(errors) < 1.5 * floor,
+    );
+    let (turns, steadiness) = turning(&paper);
+    figure.goal(
+        "ch12: at least one turn, more than half of the area swept in its sense",
+        turns.abs() >= 1.0 && steadiness > 0.5,
+    );
+    figure.picture(&compose(&paper, &view)?)
 }
 
-/// How often the curve turns around the mean of the positions, and which share of its turning goes in
-/// that sense.
+/// The error in vertex positions.
+fn positions(error: &Errors) -> f64 {
+    error.positions.unwrap_or(f64::NAN)
+}
+
+/// How often the curve turns around the mean of the positions, and what is left of the area that its radius
+/// sweeps when one sense counts against the other.
 fn turning(loom: &Loom) -> (f64, f64) {
     let positions = &loom.layout().positions;
     let middle =
         [0, 1].map(|axis| positions.iter().map(|p| p[axis]).sum::<f64>() / positions.len() as f64);
-    let angle = |p: &[f64; 2]| (p[1] - middle[1]).atan2(p[0] - middle[0]);
-    let whole = std::f64::consts::TAU;
-    let steps = positions.windows(2).map(|pair| {
-        let step = angle(&pair[1]) - angle(&pair[0]);
-        step - whole * (step / whole).round()
-    });
-    let (net, all) = steps.fold((0.0, 0.0), |(net, all), step| {
-        (net + step, all + step.abs())
-    });
-    (net / whole, if all > 0.0 { net.abs() / all } else { 0.0 })
+    let from = |p: &[f64; 2]| [p[0] - middle[0], p[1] - middle[1]];
+    let (mut turned, mut net, mut all) = (0.0, 0.0, 0.0);
+    for pair in positions.windows(2) {
+        let (a, b) = (from(&pair[0]), from(&pair[1]));
+        let swept = a[0] * b[1] - a[1] * b[0];
+        turned += swept.atan2(a[0] * b[0] + a[1] * b[1]);
+        net += swept;
+        all += swept.abs();
+    }
+    let steadiness = if all > 0.0 { f64::abs(net) / all } else { 0.0 };
+    (turned / std::f64::consts::TAU, steadiness)
 }
 
 /// The map with shapes above and below it, each linked to its place.

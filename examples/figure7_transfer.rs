@@ -71,6 +71,15 @@ fn draw(figure: &mut Figure) -> Result<()> {
         "gradients and patch-lri stretch edges less than vertices do",
         gradients < vertices && patches < vertices,
     );
+    let known = own
+        .iter()
+        .chain([&targets])
+        .map(|known| rest.strain(known).0);
+    let most = 1.2 * known.fold(0.0, f64::max);
+    figure.goal(
+        "and at most a fifth more than the examples or the animal's own gallop",
+        gradients < most && patches < most,
+    );
     figure.picture(&compose(&gallop, &view, &found, own.as_ref()))
 }
 
@@ -85,7 +94,7 @@ fn moved(gallop: &Sequence, examples: &Examples, space: &str) -> Result<Moved> {
     let options = FitOptions {
         space: space.to_string(),
         left_out: false,
-        ..FitOptions::default()
+        ..FitOptions::ch12()
     };
     let task = Task::default();
     let loom = fit::fit(gallop, &options, &task)?.output;
