@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::drift::Drift;
 use super::ghost::{Following, GhostReport};
-use crate::math::key_spline::KeySpline;
+use crate::math::key_spline::{Controls, KeySpline};
 use crate::mesh::{FrameSource, Topology};
 use crate::space::ShapeSpace;
 
@@ -62,6 +62,29 @@ impl Motion {
             report,
             idle: Mutex::default(),
         }
+    }
+
+    /// The motion through the same keys at other times and with other controls: the keys' coordinates, the
+    /// space and all factors are shared. None where there is more to do: at ends with given velocities,
+    /// with a drift that was split off, for times that do not rise.
+    #[must_use]
+    pub fn again(&self, times: &[f64], controls: Controls<'_>) -> Option<Self> {
+        if self.drift.is_some() {
+            return None;
+        }
+        let following = match &self.following {
+            Some(following) => Some(following.again(times, controls)?),
+            None => None,
+        };
+        let (space, spline) = (Arc::clone(&self.space), self.spline.again(times, controls)?);
+        let (topology, report) = (Arc::clone(&self.topology), self.report.clone());
+        Some(Motion::new(
+            topology,
+            (space, spline),
+            following,
+            None,
+            report,
+        ))
     }
 
     /// The connectivity.

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::key::Key;
+use super::key_motion::KeyControls;
 use super::value::Frames;
 use crate::diag::{Diagnostic, Result, Warned};
 use crate::inbetween::{
@@ -96,6 +97,62 @@ impl CompleteRequest {
     pub fn times_of(&self, poses: &Sequence) -> Result<Vec<f64>> {
         let [first, last] = self.keys(poses)?.ends();
         self.at.between(first, last)
+    }
+
+    /// Times and handles of the keys, each given or by default.
+    ///
+    /// # Errors
+    /// Times that do not suit the keys, another number of handles than keys.
+    pub fn controls(&self, poses: &Sequence) -> Result<KeyControls> {
+        let times = self.keys(poses)?.times().to_vec();
+        let mut handles = self.handles(times.len())?;
+        handles.resize(times.len(), Handle::default());
+        Ok(KeyControls { times, handles })
+    }
+
+    /// The same with other times and handles.
+    #[must_use]
+    pub fn with(&self, controls: &KeyControls) -> Self {
+        let each = |of: fn(&Handle) -> f64| controls.handles.iter().map(of).collect();
+        CompleteRequest {
+            times: Some(controls.times.clone()),
+            tension: each(|handle| handle.tension),
+            continuity: each(|handle| handle.continuity),
+            bias: each(|handle| handle.bias),
+            ..self.clone()
+        }
+    }
+
+    /// Whether another request asks for the same but for times, handles, frames and their rate: then
+    /// coordinates and factors are the same. Given velocities never are.
+    pub(super) fn differs_in_controls(&self, other: &Self) -> bool {
+        let rest = |request: &Self| {
+            let Velocities { start, end, both } = &request.velocities;
+            let given = start.is_some() || end.is_some() || both.is_some();
+            let rest = CompleteRequest {
+                times: None,
+                at: Times::default(),
+                fps: None,
+                velocities: Velocities::default(),
+                tension: Vec::new(),
+                continuity: Vec::new(),
+                bias: Vec::new(),
+                overshoot: None,
+                ..request.clone()
+            };
+            (!given).then(|| format!("{rest:?}"))
+        };
+        rest(self).is_some_and(|own| rest(other) == Some(own))
+    }
+
+    /// Whether the motion goes round.
+    pub(super) fn is_periodic(&self) -> bool {
+        self.boundary.as_deref() == Some("periodic")
+    }
+
+    /// Whether its ends have given velocities.
+    pub(super) fn is_hermite(&self) -> bool {
+        self.boundary.as_deref() == Some("hermite")
     }
 
     /// The key of the result.

@@ -1,11 +1,11 @@
 //! Keys and the spline through them as a picture of the shape space (X19 Fig. 2b): the plane of the two
 //! leading principal components of the keys' coordinates.
 
-use crate::diag::{Diagnostic, Result};
+use super::key_plane::KeyPlane;
+use crate::diag::Result;
 use crate::inbetween::Motion;
-use crate::math::pca::{Pca, PcaError, Table};
 use crate::plot::{
-    Anchor, Chart, Panel, PoseSpace, Scale, Scene, Series, Theme, Tint, chart, pose_space,
+    Anchor, Chart, MapNames, Panel, PoseSpace, Scale, Scene, Series, Theme, Tint, chart, pose_space,
 };
 use crate::task::Task;
 
@@ -37,55 +37,27 @@ pub struct KeyPath {
 /// # Errors
 /// Coordinates that are not finite; cancellation.
 pub fn key_path(motion: &Motion, task: &Task) -> Result<KeyPath> {
+    let plane = KeyPlane::of(motion, task)?;
     let spline = motion.spline();
-    let (times, width) = (spline.times().to_vec(), spline.width());
-    let mut rows = vec![0.0; times.len() * width];
-    for (time, row) in times.iter().zip(rows.chunks_exact_mut(width.max(1))) {
-        spline.evaluate(*time, row);
-    }
-    let table = Table::new(&rows, width);
-    let pca = Pca::new(&table, task).map_err(told)?;
-    let basis = pca.basis(&table, 2, task).map_err(told)?;
-    let place = |row: &[f64]| {
-        let along = |axis: usize| {
-            let vector = basis.vectors.chunks_exact(width.max(1)).nth(axis);
-            let vector = vector.unwrap_or_default();
-            let centred = row.iter().zip(pca.mean()).map(|(z, mean)| z - mean);
-            centred.zip(vector).map(|(z, h)| z * h).sum::<f64>()
-        };
-        [along(0), along(1)]
-    };
-    let curve_times = dense(&times, width);
-    let mut row = vec![0.0; width];
+    let curve_times = dense(spline.times(), spline.width());
+    let mut code = vec![0.0; spline.width()];
     let mut curve = Vec::with_capacity(curve_times.len());
     for time in &curve_times {
         task.check()?;
-        spline.evaluate(*time, &mut row);
-        curve.push(place(&row));
+        spline.evaluate(*time, &mut code);
+        curve.push(plane.place(&code));
     }
-    let missed = if pca.spread() > 0.0 {
-        basis.residual / pca.spread()
-    } else {
-        0.0
-    };
     Ok(KeyPath {
-        keys: rows.chunks_exact(width.max(1)).map(place).collect(),
-        times,
+        keys: plane.keys(),
+        times: spline.times().to_vec(),
         curve,
         curve_times,
-        share: 1.0 - missed * missed,
+        share: plane.share,
     })
 }
 
-fn told(error: PcaError) -> Box<Diagnostic> {
-    match error {
-        PcaError::Cancelled => crate::task::Cancelled.into(),
-        _ => Box::new(Diagnostic::error("the keys' coordinates are not finite")),
-    }
-}
-
 /// Times from the first key to the last, every key among them.
-fn dense(times: &[f64], width: usize) -> Vec<f64> {
+pub(super) fn dense(times: &[f64], width: usize) -> Vec<f64> {
     let pieces = times.len().saturating_sub(1).max(1);
     let most = SAMPLES.min(NUMBERS / width.max(1)) / pieces;
     let steps = SMOOTH.min(most).max(1);
@@ -107,6 +79,7 @@ pub fn key_map(path: &KeyPath) -> PoseSpace {
         times: path.curve_times.clone(),
         frames: path.keys.clone(),
         shown: (1..=path.keys.len()).collect(),
+        names: MapNames::keys(),
         ..PoseSpace::default()
     }
 }

@@ -19,7 +19,7 @@ mod time_signal;
 
 pub use axes::{Axis, Plane, Scale, Tick, Ticks};
 pub use chart::{Chart, Panel, Series, Style, chart};
-pub use pose_space::{PoseSpace, pose_space};
+pub use pose_space::{MapNames, PoseSpace, pose_space};
 pub use raster::raster;
 pub use scatter::{Group, Scatter, scatter};
 pub use scene::{Anchor, Color, Item, Label, Path, Point, Rect, Scene, Segment, Stroke};

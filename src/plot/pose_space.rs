@@ -31,6 +31,8 @@ pub struct PoseSpace {
     pub pins: Vec<(usize, [f64; 2])>,
     /// Frames, from 1, that are numbered before all others and drawn larger.
     pub shown: Vec<usize>,
+    /// Tangents at a point of the curve: from where to where.
+    pub arms: Vec<[[f64; 2]; 2]>,
     /// Points set off from all others, without numbers.
     pub marked: Vec<[f64; 2]>,
     /// Times between which the curve is set off, the first below the second.
@@ -46,6 +48,49 @@ pub struct PoseSpace {
     pub pictures: Vec<([f64; 2], f64, Arc<Image>)>,
     /// Which part of the plane to show: x range, y range. `None` shows everything.
     pub window: Option<[[f64; 2]; 2]>,
+    /// What things are called.
+    pub names: MapNames,
+}
+
+/// What a map calls what it shows: by default a loom's curve and frames.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct MapNames {
+    /// The curve.
+    pub curve: &'static str,
+    /// The points that the curve passes.
+    pub points: &'static str,
+    /// The last of them, which is set off; empty where it is no end of anything.
+    pub last: &'static str,
+    /// The horizontal axis.
+    pub x: String,
+    /// The vertical axis.
+    pub y: String,
+}
+
+impl Default for MapNames {
+    fn default() -> Self {
+        MapNames {
+            curve: "f(t)",
+            points: "frames",
+            last: "last frame",
+            x: "p₁ (layout units)".into(),
+            y: "p₂ (layout units)".into(),
+        }
+    }
+}
+
+impl MapNames {
+    /// Of key poses and the spline through them.
+    #[must_use]
+    pub fn keys() -> Self {
+        MapNames {
+            curve: "spline",
+            points: "keys",
+            last: "last key",
+            x: "p₁ (units of the space)".into(),
+            y: "p₂ (units of the space)".into(),
+        }
+    }
 }
 
 /// Most numbered frames on a map, besides pins and shown frames.
@@ -77,7 +122,7 @@ pub fn pose_space(map: &PoseSpace, width: f32, height: f32, theme: &Theme) -> (S
     }
     plane.draw_grid(&mut scene, theme, &x, &y);
     let beyond = map.sites_beyond(&plane);
-    if map.window.is_some() || !beyond.is_empty() {
+    if map.window.is_some() || !beyond.is_empty() || !map.arms.is_empty() {
         scene.clipped(plane.area, |scene| map.draw(scene, &plane, theme));
     } else {
         map.draw(&mut scene, &plane, theme);
@@ -86,8 +131,8 @@ pub fn pose_space(map: &PoseSpace, width: f32, height: f32, theme: &Theme) -> (S
         draw_beyond(&mut scene, plane.area, &beyond, theme);
     }
     plane.draw_frame(&mut scene, theme);
-    plane.draw_x(&mut scene, theme, &x, "p₁ (layout units)");
-    plane.draw_y(&mut scene, theme, &y, "p₂ (layout units)");
+    plane.draw_x(&mut scene, theme, &x, &map.names.x);
+    plane.draw_y(&mut scene, theme, &y, &map.names.y);
     legend.draw(&mut scene, theme, plane.area.left);
     if let Some(bar) = bar {
         bar.draw(&mut scene, theme, plane.area);
@@ -112,13 +157,13 @@ impl PoseSpace {
     fn legend(&self, theme: &Theme, width: f32) -> Legend {
         let marks = Marks::of(theme);
         let entries = [
-            (marks.curve, "f(t)", self.curve.len() > 1),
-            (marks.frame, "frames", !self.frames.is_empty()),
+            (marks.curve, self.names.curve, self.curve.len() > 1),
+            (marks.frame, self.names.points, !self.frames.is_empty()),
             (marks.site, "sites", !self.sites.is_empty()),
             (marks.control, "control points", !self.controls.is_empty()),
             (marks.pin, "pins", !self.pins.is_empty()),
             (marks.advised, "pins advised", !self.advised.is_empty()),
-            (marks.end, "last frame", self.frames.len() > 1),
+            (marks.end, self.names.last, self.ends()),
             (marks.astray, "off the frames’ way", !self.advice.is_empty()),
         ];
         let present = entries.into_iter().filter(|entry| entry.2);
@@ -127,7 +172,8 @@ impl PoseSpace {
     }
 
     /// Ranges of everything shown, with a margin for marks; equal centres for lone points.
-    fn ranges(&self) -> [[f64; 2]; 2] {
+    #[must_use]
+    pub fn ranges(&self) -> [[f64; 2]; 2] {
         let box_of = |points: &[[f64; 2]]| {
             let along = |axis: usize| range_of(points.iter().map(|point| point[axis]));
             Some([along(0)?, along(1)?])
@@ -162,6 +208,7 @@ impl PoseSpace {
         self.draw_dots(scene, plane, theme);
         self.draw_arrows(scene, &steps, theme);
         self.draw_marked(scene, plane, theme);
+        self.draw_arms(scene, plane, theme);
         for (_, at) in self.pins.iter().filter(|(_, at)| finite(at)) {
             marks.pin.draw(scene, theme, plane.pixel(*at));
         }
@@ -243,6 +290,17 @@ impl PoseSpace {
         }
     }
 
+    /// A line and a square at its end.
+    fn draw_arms(&self, scene: &mut Scene, plane: &Plane, theme: &Theme) {
+        let (unit, colour) = (theme.unit(), theme.series[3]);
+        for ends in self.arms.iter().filter(|ends| ends.iter().all(finite)) {
+            let [from, to] = ends.map(|at| plane.pixel(at));
+            scene.line(from, to, Stroke::new(colour, 1.6 * unit));
+            let rim = Stroke::new(theme.background, unit);
+            scene.ring(to, 3.6 * unit, Some(colour), rim);
+        }
+    }
+
     fn draw_arrows(&self, scene: &mut Scene, steps: &[(Point, f64)], theme: &Theme) {
         let points: Vec<Point> = steps.iter().map(|(at, _)| *at).collect();
         let color = self.colors(theme);
@@ -276,9 +334,14 @@ impl PoseSpace {
                 rim,
             );
         }
-        if let [_, .., last] = self.frames[..] {
+        if let (true, Some(&last)) = (self.ends(), self.frames.last()) {
             draw_all(scene, plane, theme, marks.end, &[last]);
         }
+    }
+
+    /// Whether the last frame is an end.
+    fn ends(&self) -> bool {
+        self.frames.len() > 1 && !self.names.last.is_empty()
     }
 
     /// A dot each frame, all rims below all dots; smaller where they stand close.

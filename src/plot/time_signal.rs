@@ -32,7 +32,7 @@ pub struct TimeSignals {
 }
 
 /// The panels in a picture of `width` x `height` pixels, and where their data lies, from top to bottom:
-/// coordinates, speed, rho, error.
+/// coordinates, speed, and where there is a rho, that and the error.
 pub fn time_signals(
     signals: &TimeSignals,
     width: f32,
@@ -44,15 +44,15 @@ pub fn time_signals(
 
 impl TimeSignals {
     fn chart(&self) -> Chart {
+        let mut panels = vec![self.coordinates(), self.speeds()];
+        // A motion through keys has neither.
+        if !self.rho.is_empty() {
+            panels.extend([self.parameter(), self.errors()]);
+        }
         Chart {
             name: "t (frames)".into(),
             range: self.window,
-            panels: vec![
-                self.coordinates(),
-                self.speeds(),
-                self.parameter(),
-                self.errors(),
-            ],
+            panels,
             rug: Some(("knots".into(), self.knots.clone())),
             bands: self.advice.clone(),
             ..Chart::default()

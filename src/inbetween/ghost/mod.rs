@@ -25,7 +25,7 @@ use serde::Serialize;
 
 use super::keys::Keys;
 use crate::diag::{Diagnostic, Result, Warned};
-use crate::math::key_spline::KeySpline;
+use crate::math::key_spline::{Controls, KeySpline};
 use crate::mesh::collapse::{CollapseError, Collapsed, collapse};
 use crate::mesh::rigid_align::mean as mean_vertex;
 use crate::mesh::{FrameSource, Topology, torn};
@@ -261,10 +261,10 @@ fn screening(lift: Lift) -> f64 {
 
 /// A mesh that follows its ghost.
 pub(super) struct Following {
-    turns: Turns,
-    direct: Direct,
+    turns: Arc<Turns>,
+    direct: Arc<Direct>,
     /// None for the direct lift.
-    gradients: Option<Gradients>,
+    gradients: Option<Arc<Gradients>>,
     /// Cardinal weights of the keys by time; none without a residual.
     weights: Option<KeySpline>,
     /// The mean vertex of the mesh by time.
@@ -305,12 +305,28 @@ impl Following {
         };
         let carriers = walk.to_vertices(&poses[0], &ghost.absorber);
         Ok(Following {
-            direct: Direct::new(poses, &ghosts, carriers, at_key, keep),
-            gradients,
-            turns,
+            direct: Arc::new(Direct::new(poses, &ghosts, carriers, at_key, keep)),
+            gradients: gradients.map(Arc::new),
+            turns: Arc::new(turns),
             weights,
             mean,
             vertices: ghost.vertices.len(),
+        })
+    }
+
+    /// The same mesh with its keys at other times, see [`KeySpline::again`].
+    pub(super) fn again(&self, times: &[f64], controls: Controls<'_>) -> Option<Self> {
+        let weights = match &self.weights {
+            Some(weights) => Some(weights.again(times, controls)?),
+            None => None,
+        };
+        Some(Following {
+            turns: Arc::clone(&self.turns),
+            direct: Arc::clone(&self.direct),
+            gradients: self.gradients.clone(),
+            weights,
+            mean: self.mean.again(times, controls)?,
+            vertices: self.vertices,
         })
     }
 

@@ -21,8 +21,10 @@ impl Handle {
         *self == Handle::default()
     }
 
-    /// The incoming and the outgoing slope, for the slopes of the lines before and after.
-    pub(super) fn slopes(&self, m: f64, before: f64, after: f64) -> [f64; 2] {
+    /// The incoming and the outgoing slope, for the slope m without a handle and those of the lines before
+    /// and after.
+    #[must_use]
+    pub fn slopes(&self, m: f64, before: f64, after: f64) -> [f64; 2] {
         let (c, b) = (self.continuity, self.bias);
         let half = 0.5 * (before - after);
         [

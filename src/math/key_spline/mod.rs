@@ -47,6 +47,8 @@ pub struct KeySpline {
     width: usize,
     blocks: Vec<Block>,
     periodic: bool,
+    /// Whether the ends were given slopes or are no knots: nothing here tells them.
+    told_ends: bool,
 }
 
 /// Some neighbouring columns; each array has n rows.
@@ -110,6 +112,30 @@ impl KeySpline {
             width,
             blocks,
             periodic: ends == Ends::Periodic,
+            told_ends: !matches!(ends, Ends::Natural | Ends::Periodic),
+        })
+    }
+
+    /// The curves through the same rows at other times and with other controls. None where ends that are
+    /// neither natural nor periodic would have to be given again, and for times that do not suit.
+    #[must_use]
+    pub fn again(&self, times: &[f64], controls: Controls<'_>) -> Option<Self> {
+        let handles = controls.handles.len();
+        let counts = times.len() == self.times.len() && (handles == 0 || handles == times.len());
+        if self.told_ends || !counts || CubicSpline::new(times, &[], 0, Ends::Natural).is_err() {
+            return None;
+        }
+        let ends = match self.periodic {
+            true => Ends::Periodic,
+            false => Ends::Natural,
+        };
+        let anew =
+            |block: &Block| Block::new(times, block.values.clone(), block.columns, ends, controls);
+        let blocks = self.blocks.par_iter().map(anew).collect::<Result<_, _>>();
+        Some(KeySpline {
+            times: times.to_vec(),
+            blocks: blocks.ok()?,
+            ..*self
         })
     }
 

@@ -172,6 +172,26 @@ fn one_key_is_a_constant_two_a_line_none_an_error() {
 }
 
 #[test]
+fn the_same_rows_at_other_times_are_the_spline_of_those_times() {
+    let times = [0.0, 2.0, 2.5, 4.0, 6.0, 8.0];
+    let handles = [handle(0.5, 0.0, 0.3); 6];
+    let controls = Controls {
+        handles: &handles,
+        overshoot: Some(0.1),
+    };
+    for ends in [Ends::Natural, Ends::Periodic] {
+        let again = spline(ends, &[], None).again(&times, controls).unwrap();
+        let known = KeySpline::new(&times, &ROWS, 1, ends, controls).unwrap();
+        assert_eq!(again, known);
+    }
+    assert_eq!(spline(CLAMPED, &[], None).again(&times, controls), None);
+    let natural = spline(Ends::Natural, &[], None);
+    for times in [&times[1..], &[0.0, 2.0, 1.0, 4.0, 6.0, 8.0]] {
+        assert_eq!(natural.again(times, controls), None);
+    }
+}
+
+#[test]
 fn many_columns_are_many_curves() {
     let width = 2 * COLUMNS + 7;
     let rows: Vec<f64> = (0..6 * width)
