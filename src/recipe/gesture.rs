@@ -3,7 +3,7 @@
 //! stays. What a loop or a variable made is never rewritten.
 
 use super::text::{Call, Chain, amend, calls, insert_method, is_literal, number, result_chain};
-use super::{Setting, text};
+use super::{KeyNumber, Make, Setting, result, text};
 use crate::diag::{Diagnostic, Result};
 
 /// Something done by hand to the recipe's result.
@@ -100,6 +100,15 @@ pub enum Gesture {
         /// Where.
         at: [f64; 2],
     },
+    /// `complete`: numbers of a key pose (from 1).
+    Key {
+        /// Which.
+        key: usize,
+        /// What changes, and the numbers of all keys.
+        numbers: Vec<(KeyNumber, Vec<f64>)>,
+    },
+    /// Another thing is made of the poses.
+    Make(Make),
     /// The default of a parameter.
     Param {
         /// Which.
@@ -139,10 +148,13 @@ const KEEP_CONTROLS: [&str; 10] = [
 ///
 /// # Errors
 /// The recipe does not end in an expression that a method could follow; a parameter is not declared with
-/// a plain value.
+/// a plain value; the result is no completion whose key could be changed.
 pub fn write(recipe: &str, gesture: &Gesture) -> Result<Written> {
-    if let Gesture::Param { name, value } = gesture {
-        return set_default(recipe, name, value);
+    match gesture {
+        Gesture::Param { name, value } => return set_default(recipe, name, value),
+        Gesture::Key { key, numbers } => return result::with_key(recipe, *key, numbers),
+        Gesture::Make(make) => return result::made(recipe, *make),
+        _ => {}
     }
     let Some(chain) = result_chain(recipe) else {
         return Diagnostic::error(
@@ -296,6 +308,8 @@ fn amended(recipe: &str, calls: &[Call], gesture: &Gesture) -> Option<Written> {
         | Gesture::AddPose { .. }
         | Gesture::Trim { .. }
         | Gesture::InsertControl { .. }
+        | Gesture::Key { .. }
+        | Gesture::Make(_)
         | Gesture::Param { .. } => None,
     }
 }
@@ -465,6 +479,8 @@ impl Gesture {
             Gesture::Retime { keys } => format!("retime({})", list(keys)),
             Gesture::AddPose { at } => format!("add_pose({})", point(*at)),
             Gesture::Param { name, value } => format!("param({name:?}, {value})"),
+            Gesture::Key { key, .. } => format!("complete(key {key})"),
+            Gesture::Make(make) => format!("{}()", make.function()),
         }
     }
 }

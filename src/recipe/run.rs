@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::Param;
 use crate::diag::{Diagnostic, Result};
-use crate::pipeline::{InputSpec, LoomValue, Step, Value};
+use crate::pipeline::{Completion, InputSpec, LoomValue, Step, Value};
 use crate::task::Task;
 
 /// The text of a recipe and where it came from.
@@ -54,6 +54,11 @@ pub struct Outcome {
     pub value: Value,
     /// The loom that the value's frames were sampled from, where they were.
     pub sampled: Option<LoomValue>,
+    /// The key poses that the value's frames were completed from, and how, where they were.
+    pub completed: Option<Completion>,
+    /// What the value's poses, or the keys that it was completed from, are called; empty where they have no
+    /// names.
+    pub names: Vec<String>,
     /// The declared parameters with their values.
     pub params: Vec<Param>,
     /// What is to be written.

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 /// A piece of a recipe that is not white space or comment. Ranges are bytes of the text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Token {
+pub(super) enum Token {
     /// An identifier or keyword.
     Word,
     /// A number, string, character or template.
@@ -287,7 +287,7 @@ fn arguments(tokens: &[(Token, Range<usize>)], open: usize) -> Option<(Vec<Range
     None
 }
 
-fn tokens(text: &str) -> Vec<(Token, Range<usize>)> {
+pub(super) fn tokens(text: &str) -> Vec<(Token, Range<usize>)> {
     let bytes = text.as_bytes();
     let mut found = Vec::new();
     let mut at = 0;
