@@ -152,7 +152,10 @@ fn targets<'a>(
         .saves
         .iter()
         .map(|save| (&save.value, Output::from(&save.path).protecting(inputs)));
-    let shown = !matches!(outcome.value, Value::Nothing | Value::Text(_));
+    let shown = !matches!(
+        outcome.value,
+        Value::Nothing | Value::Statistics(_) | Value::Text(_)
+    );
     let last = output
         .filter(|_| shown)
         .map(|output| (&outcome.value, Output::from(output).protecting(inputs)));
@@ -165,6 +168,7 @@ pub(super) fn object(outcome: &Outcome, outputs: &[PathBuf], seconds: &Json) -> 
         Value::Loom(loom) => (json!(loom.frames()), loom.report()),
         Value::Sequence(frames) => (json!(frames.frames()), Json::Null),
         Value::Shape(_) => (json!(1), Json::Null),
+        Value::Statistics(found) => (Json::Null, json!(found.value.to_string())),
         Value::Text(text) => (Json::Null, json!(text)),
         Value::Nothing | Value::Picture(_) => (Json::Null, Json::Null),
     };

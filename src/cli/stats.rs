@@ -96,25 +96,12 @@ impl Args {
             outputs.extend(pipeline::save(world, &shapes, &output(&path), task)?.outputs);
         }
         if let Some(path) = &self.plot {
-            let scene = found.figure(&names(files), &Theme::light());
+            let names = pipeline::pose_names(files, found.report().poses);
+            let scene = found.figure(&names, &Theme::light());
             let saved = pipeline::save_picture(world, &scene, &output(path), 2.0)?;
             outputs.extend(saved.outputs);
         }
         Ok(outputs)
-    }
-}
-
-/// What poses are called in the picture: their files, if there is one for each.
-fn names(files: &[PathBuf]) -> Vec<String> {
-    let stem = |file: &PathBuf| {
-        file.file_stem()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into()
-    };
-    match files {
-        [_] => Vec::new(),
-        files => files.iter().map(stem).collect(),
     }
 }
 

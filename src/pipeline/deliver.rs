@@ -59,13 +59,15 @@ fn frames(value: &Value, path: &Path) -> Result<Arc<dyn FrameSource>> {
         Value::Sequence(frames) => Ok(Arc::clone(&frames.value) as Arc<dyn FrameSource>),
         Value::Loom(loom) => Ok(Arc::new(Sampled::integers((*loom.loom.value).clone()))),
         Value::Shape(shape) => Ok(Arc::new(shape.value.sequence()) as Arc<Sequence>),
-        Value::Nothing | Value::Text(_) | Value::Picture(_) => Diagnostic::error(format!(
-            "there are no frames to write: the recipe ends in {}",
-            value.kind()
-        ))
-        .in_file(path)
-        .hint("let the last line be a loom, a sequence or a mesh, without a semicolon")
-        .err(),
+        Value::Nothing | Value::Statistics(_) | Value::Text(_) | Value::Picture(_) => {
+            Diagnostic::error(format!(
+                "there are no frames to write: the recipe ends in {}",
+                value.kind()
+            ))
+            .in_file(path)
+            .hint("let the last line be a loom, a sequence or a mesh, without a semicolon")
+            .err()
+        }
     }
 }
 

@@ -7,7 +7,9 @@ use serde::Serialize;
 use super::value::Shape;
 use crate::diag::{Diagnostic, Result, Warned};
 use crate::mesh::{Edges, FrameSource, Sequence, Topology};
-use crate::plot::{Group, Scatter, Scene, Spectrum, Theme, Tint, scatter, spectrum};
+use crate::plot::{
+    Group, MapNames, PoseSpace, Scatter, Scene, Spectrum, Theme, Tint, scatter, spectrum,
+};
 use crate::space::SPACES;
 use crate::statistics::{EDGE_LENGTHS, Ground, Population, aligned, scale_free};
 use crate::task::Task;
@@ -204,26 +206,84 @@ impl Statistics {
         })
     }
 
+    /// The connectivity.
+    pub fn topology(&self) -> &Arc<Topology> {
+        &self.topology
+    }
+
+    /// The poses as they were compared: aligned rigidly, of one size where that was asked.
+    pub fn aligned_poses(&self) -> Sequence {
+        let positions = self.poses.iter().flatten().map(|&x| x as f32);
+        Sequence::new(Arc::clone(&self.topology), positions.collect(), None)
+    }
+
+    /// The shape of a point of the plane of the first two modes: the mean and that much of each.
+    ///
+    /// # Errors
+    /// None that finite places can cause.
+    pub fn shape_of(&self, place: [f64; 2]) -> Result<Warned<Shape>> {
+        let modes = self.modes().min(2);
+        self.shape(&self.population.at(&place[..modes]))
+    }
+
+    /// Where a pose (from 0) lies in the plane of the first two modes.
+    pub fn place(&self, pose: usize) -> [f64; 2] {
+        let along = self.population.coordinates(pose);
+        [0, 1].map(|mode| along.get(mode).copied().unwrap_or(0.0))
+    }
+
+    /// The share of each mode in the variance, largest first.
+    pub fn explained(&self) -> &[f64] {
+        self.population.explained()
+    }
+
+    /// What an axis of the plane is called, counted from 0; nothing where there is no such mode.
+    fn axis(&self, mode: usize) -> String {
+        match self.explained().get(mode) {
+            Some(share) => format!("mode {} ({:.0} %)", mode + 1, 100.0 * share),
+            None => String::new(),
+        }
+    }
+
+    /// The plane of the first two modes as a map: the poses in it.
+    pub fn map(&self) -> PoseSpace {
+        PoseSpace {
+            frames: (0..self.poses.len()).map(|pose| self.place(pose)).collect(),
+            shown: (1..=self.poses.len()).collect(),
+            names: MapNames {
+                curve: "",
+                points: "poses",
+                last: "",
+                x: self.axis(0),
+                y: self.axis(1),
+            },
+            ..PoseSpace::default()
+        }
+    }
+
+    /// The shares of the modes as a plot's data, in percent.
+    pub fn shares(&self) -> Spectrum {
+        let shares = self.explained();
+        Spectrum {
+            values: shares.iter().map(|share| 100.0 * share).collect(),
+            kept: shares.len(),
+            name: "share of the variance, %".into(),
+        }
+    }
+
     /// The poses by their first two modes, with their names, and the shares of all modes.
     pub fn figure(&self, names: &[String], theme: &Theme) -> Scene {
         let [width, height] = FIGURE;
-        let shares = self.population.explained();
-        let axis = |mode: usize| match shares.get(mode) {
-            Some(share) => format!("mode {} ({:.0} %)", mode + 1, 100.0 * share),
-            None => String::new(),
-        };
         let place = |pose: usize| {
-            let along = self.population.coordinates(pose);
-            let at = |mode: usize| along.get(mode).copied().unwrap_or(0.0);
             let name = names.get(pose).cloned();
             (
-                [at(0), at(1)],
+                self.place(pose),
                 name.unwrap_or_else(|| (pose + 1).to_string()),
             )
         };
         let points = Scatter {
-            x: axis(0),
-            y: axis(1),
+            x: self.axis(0),
+            y: self.axis(1),
             groups: vec![
                 Group {
                     name: "mean".into(),
@@ -237,17 +297,21 @@ impl Statistics {
                 },
             ],
         };
-        let shares = Spectrum {
-            values: shares.iter().map(|share| 100.0 * share).collect(),
-            kept: shares.len(),
-            name: "share of the variance, %".into(),
-        };
         let first = (SCATTER * width).round();
         let mut scene = Scene::new(width, height, theme.background);
         scene.place(scatter(&points, first, height, theme).0, [0.0, 0.0]);
-        let rest = spectrum(&shares, width - first, height, theme).0;
+        let rest = spectrum(&self.shares(), width - first, height, theme).0;
         scene.place(rest, [first, 0.0]);
         scene
+    }
+}
+
+impl std::fmt::Debug for Statistics {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Statistics")
+            .field("poses", &self.poses.len())
+            .field("request", &self.request)
+            .finish_non_exhaustive()
     }
 }
 
@@ -344,6 +408,25 @@ mod tests {
             let told = |item: &&Item| matches!(item, Item::Text(label) if label.text == *name);
             assert_eq!(scene.items.iter().filter(told).count(), 1, "{name}");
         }
+    }
+
+    #[test]
+    fn a_pose_s_place_in_the_plane_of_all_modes_has_its_shape() {
+        let found = found("gradients");
+        let poses = found.aligned_poses();
+        let map = found.map();
+        assert!(map.names.x.contains("mode 1 (") && map.frames.len() == 3);
+        for (pose, place) in map.frames.iter().enumerate() {
+            let shape = found.shape_of(*place).unwrap().output;
+            let pairs = shape.positions.iter().zip(poses.frame(pose));
+            // three poses lie in a plane; f32 positions of a cactus about a metre high
+            assert!(pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max) < 1e-5);
+        }
+        let mean = found.mean().unwrap().output;
+        assert_eq!(
+            found.shape_of([0.0; 2]).unwrap().output.positions,
+            mean.positions
+        );
     }
 
     #[test]

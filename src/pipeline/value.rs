@@ -180,6 +180,8 @@ pub enum Value {
     Loom(LoomValue),
     /// One mesh.
     Shape(Keyed<Shape>),
+    /// Poses and their principal components.
+    Statistics(StatisticsValue),
     /// A text or a number, as it is told to people.
     Text(String),
     /// A picture, as the bytes of a PNG or SVG file.
@@ -201,6 +203,7 @@ impl Value {
             Value::Sequence(_) => "a sequence",
             Value::Loom(_) => "a loom",
             Value::Shape(_) => "a mesh",
+            Value::Statistics(_) => "principal components",
             Value::Text(_) => "a text",
             Value::Picture(_) => "a picture",
         }
@@ -257,6 +260,7 @@ impl std::fmt::Display for Value {
         match self {
             Value::Loom(loom) => write!(f, "a loom of {} frames", loom.frames()),
             Value::Sequence(frames) => write!(f, "a sequence of {} frames", frames.frames()),
+            Value::Statistics(found) => found.value.fmt(f),
             Value::Text(text) => f.write_str(text),
             other => f.write_str(other.kind()),
         }

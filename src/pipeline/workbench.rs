@@ -11,14 +11,15 @@ use super::frames::in_memory;
 use super::held::Held;
 use super::key::Key;
 use super::memory::{Made, Memory, Remembered};
+use super::names::{Names, pose_names};
 use super::request::FitRequest;
 use super::value::{Frames, Keyed, LoomValue, Picture, Shape, ShapeValue, Source, content_key};
 use super::{
-    CompleteRequest, InputSpec, MorphRequest, PictureFormat, StatisticsRequest, StatisticsValue,
-    add_difference, complete, contact_sheet, files, morph, morph_frames, open, open_loom, plot,
-    statistics,
+    CompleteRequest, Completion, InputSpec, MorphRequest, PictureFormat, StatisticsRequest,
+    StatisticsValue, add_difference, complete, contact_sheet, files, morph, morph_frames, open,
+    open_loom, plot, statistics,
 };
-use crate::demo::Demo;
+use crate::demo::{Demo, FACE_POSES};
 use crate::diag::{Diagnostic, Result, Warned};
 use crate::edit::{Edit, add_loop};
 use crate::inbetween::keys::same_faces;
@@ -66,6 +67,9 @@ struct Log {
     reads: BTreeSet<PathBuf>,
     /// Frames that were sampled, by their key, and the loom they came from.
     sampled: Vec<(Key, LoomValue)>,
+    /// Frames that were completed, by their key, and what between.
+    completed: Vec<(Key, Completion)>,
+    names: Names,
     held: Held,
 }
 
@@ -171,6 +175,8 @@ impl Workbench {
             })
         })?;
         self.note("open", named(&spec.paths), made);
+        let names = pose_names(&files(self.world(), spec)?, opened.sequence.frames());
+        self.log().names.set(opened.key, names);
         let output = Keyed::new(opened.sequence.clone(), opened.key);
         Ok(Warned {
             output,
@@ -200,6 +206,10 @@ impl Workbench {
         let key = Key::of("demo").text(name).finish();
         let (sequence, made) = self.memory.remember(key, || Ok((demo.generate)()))?;
         self.note("demo", name, made);
+        if demo.name == "face" {
+            let names = FACE_POSES.iter().map(ToString::to_string).collect();
+            self.log().names.set(key, names);
+        }
         Ok(Warned::clean(Keyed {
             value: sequence,
             key,
@@ -395,6 +405,9 @@ impl Workbench {
             .number(first as f64)
             .number(last as f64)
             .finish();
+        let names = self.names_of(frames.key);
+        let some = names.get(range.clone()).unwrap_or_default().to_vec();
+        self.log().names.set(key, some);
         Ok(Keyed::new(frames.value.slice(range), key))
     }
 
@@ -431,6 +444,9 @@ impl Workbench {
         let topology = Arc::clone(&first.value.topology);
         let gathered = Keyed::new(Sequence::new(topology, positions, None), key.finish());
         self.hold_frames(&gathered)?;
+        let keys: Vec<Key> = shapes.iter().map(|shape| shape.key).collect();
+        let names = self.log().names.joined(&keys);
+        self.log().names.set(gathered.key, names);
         Ok(gathered)
     }
 
@@ -455,10 +471,27 @@ impl Workbench {
         self.note("complete", format!("{} keys", keys.frames()), made);
         let output = Keyed::new(completed.sequence.clone(), key);
         self.hold_frames(&output)?;
+        let completion = Completion {
+            keys: keys.clone(),
+            request: request.clone(),
+        };
+        self.log().completed.push((key, completion));
         Ok(Warned {
             output,
             warnings: completed.warnings.clone(),
         })
+    }
+
+    /// The names of the frames, or of the poses, that the value of a key holds; empty where they have none.
+    pub fn names_of(&self, key: Key) -> Vec<String> {
+        self.log().names.of(key)
+    }
+
+    /// The keys and the request that frames were completed from in this run.
+    pub fn completed_from(&self, frames: &Frames) -> Option<Completion> {
+        let log = self.log();
+        let (_, completion) = log.completed.iter().find(|(key, _)| *key == frames.key)?;
+        Some(completion.clone())
     }
 
     /// The frames between poses.
@@ -503,6 +536,8 @@ impl Workbench {
         let compute = || statistics(&poses.value, request, &self.task);
         let (value, made) = self.memory.remember(key, compute)?;
         self.note("statistics", format!("{} poses", poses.frames()), made);
+        let names = self.names_of(poses.key);
+        self.log().names.set(key, names);
         Ok(Keyed { value, key })
     }
 
@@ -555,7 +590,9 @@ impl Workbench {
     /// The ending names no picture.
     pub fn plot_statistics(&self, found: &StatisticsValue, path: &str) -> Result<Picture> {
         let format = PictureFormat::of(Path::new(path))?;
-        let scene = found.value.figure(&[], &Theme::light());
+        let scene = found
+            .value
+            .figure(&self.names_of(found.key), &Theme::light());
         Ok(Picture {
             bytes: format.encode(&scene, 2.0)?,
         })

@@ -253,10 +253,23 @@ impl Context {
             Value::Sequence(frames) => self.bench.sampled_from(frames),
             _ => None,
         };
+        let completed = match &value {
+            Value::Sequence(frames) => self.bench.completed_from(frames),
+            _ => None,
+        };
+        let named = match (&value, &completed) {
+            (_, Some(completion)) => Some(completion.keys.key),
+            (Value::Sequence(frames), None) => Some(frames.key),
+            (Value::Statistics(found), None) => Some(found.key),
+            _ => None,
+        };
+        let names = named.map(|key| self.bench.names_of(key));
         let log = self.log();
         Ok(Outcome {
             value,
             sampled,
+            completed,
+            names: names.unwrap_or_default(),
             params: log.params.clone(),
             saves: log.saves.clone(),
             reads,

@@ -103,7 +103,7 @@ pub(super) fn value(result: Dynamic) -> Result<Value> {
             .err();
     }
     let result = match result.try_cast_result::<StatisticsValue>() {
-        Ok(found) => return Ok(Value::Text(found.value.to_string())),
+        Ok(found) => return Ok(Value::Statistics(found)),
         Err(result) => result,
     };
     if result.is::<time::Clock>() {
