@@ -11,8 +11,10 @@ use std::time::{Duration, Instant};
 
 use meshloom::demo::Demo;
 use meshloom::format::loom;
+use meshloom::io::Disk;
 use meshloom::loom::fit::{FitOptions, fit};
 use meshloom::mesh::{FrameSource, Sequence};
+use meshloom::pipeline::{Output, save};
 use meshloom::task::Task;
 use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, native_pty_system};
 use tempfile::TempDir;
@@ -388,6 +390,24 @@ impl Screen {
         at
     }
 
+    /// Where the lines of key poses stand on the axis of time, in its first row that shows any; the
+    /// cursor hides one.
+    fn line_of_keys(&self) -> Vec<(u16, u16)> {
+        let parser = self.shown.lock().unwrap();
+        let (rows, columns) = parser.screen().size();
+        let row = |row: u16| -> Vec<(u16, u16)> {
+            let line = |column: &u16| {
+                let cell = parser.screen().cell(row, *column);
+                cell.is_some_and(|cell| cell.contents() == "┊")
+            };
+            let columns = (0..columns.get()).filter(line);
+            columns.map(|column| (column + 1, row + 1)).collect()
+        };
+        let mut rows = (0..rows.get()).map(row);
+        let found = rows.find(|lines| !lines.is_empty());
+        found.unwrap_or_default()
+    }
+
     fn signal(&self, signal: &str) {
         let id = self.child.process_id().unwrap().to_string();
         let kill = std::process::Command::new("kill")
@@ -582,4 +602,90 @@ fn what_was_in_hand_when_the_connection_was_lost_is_offered_again() {
     wait_for_text(&file, |text| text.contains(".move_control("));
     screen.press("q");
     assert_eq!(screen.ended(), 0);
+}
+
+/// A folder with three poses of a bar, far from each other, and a recipe.
+fn poses(recipe: &str) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let bar = (Demo::find("bar").expect("there is a bar").generate)();
+    let some = [0, 30, 55].map(|frame| bar.frame(frame % bar.frames()).to_vec());
+    let keys = Sequence::new(Arc::clone(bar.topology()), some.concat(), None);
+    std::fs::create_dir(folder.path().join("keys")).unwrap();
+    let output = Output::from(folder.path().join("keys/####.obj"));
+    save(&Disk, &keys, &output, &Task::default()).unwrap();
+    if !recipe.is_empty() {
+        std::fs::write(folder.path().join("r.rhai"), recipe).unwrap();
+    }
+    folder
+}
+
+const KEYED: &str = "complete(input(), #{ times: [1, 25, 49] }) // ours\n";
+
+#[test]
+fn a_key_pose_is_moved_in_time_by_the_mouse_and_undone() {
+    let folder = poses(KEYED);
+    let file = folder.path().join("r.rhai");
+    let arguments = ["open", "keys", "--recipe", "r.rhai"];
+    let mut screen = Screen::open(folder.path(), &arguments, (120, 36));
+    screen.wait("3 keys in patch-lri");
+    screen.wait("keys in time");
+    screen.settle();
+    // The second key is chosen, and its line is dragged.
+    screen.press("nn");
+    screen.wait("frame 25.00/49");
+    screen.settle();
+    let last = screen.line_of_keys().pop().expect("lines of keys");
+    screen.drag(last, last);
+    screen.wait("frame 49.00/49");
+    screen.settle();
+    let lines = screen.line_of_keys();
+    assert_eq!(lines.len(), 2, "{}", screen.text());
+    let second = lines[1];
+    screen.drag(second, (second.0 + 6, second.1));
+    let moved = wait_for_text(&file, |text| text != KEYED);
+    let time = moved
+        .strip_prefix("complete(input(), #{ times: [1, ")
+        .unwrap();
+    let time = time.strip_suffix(", 49] }) // ours\n").unwrap();
+    let time: f64 = time.parse().unwrap();
+    assert!(time > 25.0 && time < 49.0 && time.fract() == 0.0, "{moved}");
+    screen.wait(&format!("[1, {time}, 49]"));
+    screen.press("u");
+    wait_for_text(&file, |text| text == KEYED);
+    screen.wait("[1, 25, 49]");
+    screen.wait_until("the run's end", |screen| {
+        !screen.contents().contains("running")
+    });
+    // The same by keys, and a handle.
+    screen.press("t\x1b[C\x1b[C\r");
+    wait_for_text(&file, |text| text == KEYED.replace("25", "27"));
+    screen.press("d\x1b[A\x1b[A\r");
+    let turned = KEYED.replace("25, 49]", "27, 49], tension: [0, 0.1, 0]");
+    wait_for_text(&file, |text| text == turned);
+    // A loom of it, edited as any capture is.
+    screen.press("F");
+    wait_for_text(&file, |text| text.starts_with("fit(complete("));
+    screen.wait("a loom of 49 frames");
+    screen.press("H");
+    wait_for_text(&file, |text| text.contains("\n    .hold("));
+    screen.press("q");
+    assert_eq!(screen.ended(), 0);
+}
+
+#[test]
+fn poses_open_as_keys_and_turn_into_their_statistics() {
+    let folder = poses("");
+    let mut screen = Screen::open(folder.path(), &["open", "keys"], (120, 36));
+    screen.wait("complete(input())");
+    screen.wait("3 keys in patch-lri");
+    screen.press("A");
+    screen.wait("pca(input())");
+    screen.wait("pose 1 of 3 0001 in gradients");
+    screen.wait("poses by their first modes");
+    screen.press("\x1b[C");
+    screen.wait("pose 2 of 3");
+    screen.press("q");
+    assert_eq!(screen.ended(), 0);
+    let text = std::fs::read_to_string(folder.path().join("keys.rhai")).unwrap();
+    assert_eq!(text, "pca(input())\n");
 }

@@ -9,7 +9,8 @@ use std::time::Duration;
 use super::runs::{Runs, cache_folder};
 use crate::diag::{Diagnostic, Result};
 use crate::io::{Depth, Disk, Wake, Watch};
-use crate::pipeline::{Key, Value};
+use crate::mesh::{FrameSource, Sequence};
+use crate::pipeline::{self, Key, Value};
 use crate::recipe::{Failure, Outcome, Recipe, Request};
 use crate::task::Task;
 use crate::tui::{Desk, Kept};
@@ -22,6 +23,11 @@ const QUIET: Duration = Duration::from_millis(30);
 const PATIENCE: Duration = Duration::from_millis(500);
 /// How often it is looked whether other files are to be watched, or none any more.
 const LOOK: Duration = Duration::from_millis(250);
+
+/// What a capture begins with.
+const FIT: &str = "fit(input())\n";
+/// Poses up to so many begin as keys of a motion, more by what they have in common.
+const MOST_KEYS: usize = 16;
 
 /// A recipe on disk, or one that will be.
 pub(super) struct RecipeDesk {
@@ -144,6 +150,21 @@ impl RecipeDesk {
 }
 
 impl Desk for RecipeDesk {
+    fn suited(&self, frames: &Sequence) -> Option<Recipe> {
+        let mut file = self.file();
+        if file.known.is_some() || file.first != FIT || !pipeline::separate(frames) {
+            return None;
+        }
+        file.first = match frames.frames() <= MOST_KEYS {
+            true => "complete(input())\n".to_string(),
+            false => "pca(input())\n".to_string(),
+        };
+        Some(Recipe {
+            path: file.path.clone(),
+            text: file.first.clone(),
+        })
+    }
+
     fn recipe(&self) -> Result<(Recipe, bool)> {
         let file = self.file();
         let text = file.known.clone().unwrap_or_else(|| file.first.clone());
@@ -338,7 +359,7 @@ pub(super) fn beginning(inputs: &[PathBuf], loom: bool) -> Recipe {
     let text = if loom {
         format!("load({name:?})\n")
     } else {
-        "fit(input())\n".to_string()
+        FIT.to_string()
     };
     Recipe {
         path: first.with_file_name(format!("{stem}.rhai")),
@@ -375,6 +396,29 @@ mod tests {
             text: "1\n".into(),
         };
         RecipeDesk::on(Arc::new(Runs::new()), Request::default(), recipe, None)
+    }
+
+    #[test]
+    fn poses_begin_as_keys_and_many_by_what_they_have_in_common() {
+        let folder = tempfile::tempdir().unwrap();
+        let poses = (crate::demo::Demo::find("cactus").unwrap().generate)();
+        let many = (0..18).flat_map(|i| poses.frame(i % 3).to_vec()).collect();
+        let many = Sequence::new(Arc::clone(poses.topology()), many, None);
+        let begun = |frames: &Sequence| {
+            let recipe = beginning(&[folder.path().join("keys")], false);
+            let desk = RecipeDesk::on(Arc::new(Runs::new()), Request::default(), recipe, None);
+            let suited = desk.suited(frames).map(|recipe| recipe.text);
+            assert_eq!(
+                desk.recipe().unwrap().0.text,
+                suited.clone().unwrap_or(FIT.into())
+            );
+            suited
+        };
+        assert_eq!(begun(&poses).unwrap(), "complete(input())\n");
+        assert_eq!(begun(&many).unwrap(), "pca(input())\n");
+        assert_eq!(begun(&poses.slice(0..1)), None);
+        let own = desk(folder.path());
+        assert_eq!(own.suited(&poses), None);
     }
 
     #[test]

@@ -9,7 +9,7 @@ use super::desk::{self, RecipeDesk};
 use super::recipes;
 use super::runs::Runs;
 use super::session::{Outcome, Session};
-use crate::demo::Demo;
+use crate::demo::{Demo, Kind};
 use crate::diag::{Diagnostic, Result, Warned};
 use crate::io::Disk;
 use crate::mesh::{FrameSource, Sequence};
@@ -21,8 +21,8 @@ use crate::world::World;
 
 /// Look at a capture or a loom in the terminal
 ///
-/// The capture is shown while it is read, then fitted in the background; a loom is shown at once. The keys
-/// are listed by ?.
+/// The capture is shown while it is read, then fitted in the background; a loom is shown at once. Poses that
+/// are no motion become the keys of one, or are shown by their principal components. The keys are listed by ?.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     #[command(flatten)]
@@ -87,7 +87,10 @@ pub(super) fn demo(demo: &'static Demo, session: &Session) -> Result<Outcome> {
     };
     let recipe = Recipe {
         path: PathBuf::from(format!("{name}.rhai")),
-        text: format!("fit(demo({name:?}){root})\n"),
+        text: match demo.kind {
+            Kind::Motion => format!("fit(demo({name:?}){root})\n"),
+            Kind::Poses => format!("complete(demo({name:?}))\n"),
+        },
     };
     let runs = Arc::new(Runs::new());
     let request = request(recipe::Input::Demo(name.clone()));

@@ -19,6 +19,7 @@ mod keys;
 mod landings;
 mod layout;
 mod panels;
+mod posed;
 mod screen;
 mod stage;
 mod state;

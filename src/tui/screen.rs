@@ -10,7 +10,7 @@ use ratatui::widgets::{Block, Clear, Paragraph, Widget};
 use super::graphics::{Aside, Painter};
 use super::keys::{self, ACTIONS};
 use super::layout::{inner, tabbed, tabs};
-use super::panels::PANELS;
+use super::panels::{self, PANELS};
 use super::state::{Content, Front, State};
 use super::theme::Role;
 
@@ -77,7 +77,7 @@ fn draw_panel(
     let panel = PANELS[index];
     Block::bordered()
         .border_set(borders(state))
-        .title(format!(" {} ", panel.title()))
+        .title(format!(" {} ", panel.title_of(state)))
         .border_style(state.look.style(role))
         .render(area, buffer);
     let inside = inner(area);
@@ -119,7 +119,7 @@ fn waiting(state: &State, index: usize) -> &'static str {
         _ if [super::panels::DETAILS, super::panels::RECIPE].contains(&index) => "",
         _ if state.work.is_none() => "nothing to show",
         Content::Nothing | Content::FirstFrame(_) => "reading ..",
-        Content::Capture(_) | Content::Loom(..) => "fitting ..",
+        _ => "fitting ..",
     }
 }
 
@@ -155,6 +155,9 @@ fn draw_status(state: &State, buffer: &mut Buffer) {
             loom.shape().modes()
         )));
         spans.push(Span::styled(format!("error {error:.3} % "), muted));
+    }
+    if let Some(words) = panels::posed_words(state) {
+        spans.push(Span::raw(words));
     }
     if let Some((phase, done, steps)) = state.work {
         let share = if steps > 0 {

@@ -8,6 +8,7 @@ use super::graphics::CellSize;
 use super::hands::Hands;
 use super::layout;
 use super::panels::PANELS;
+use super::posed::{KeyScene, PoseScene};
 use super::theme::Look;
 use super::thumbs::{Thumb, ThumbWish};
 use super::work::{Picture, Wish};
@@ -85,6 +86,10 @@ pub(super) enum Content {
     Capture(Scene<Sequence>),
     /// The loom, and what its plots show.
     Loom(Scene<Loom>, Same<Signals>),
+    /// Key poses and the motion through them.
+    Keys(KeyScene),
+    /// Poses and their principal components.
+    Poses(PoseScene),
 }
 
 /// A loom's series for plots.
@@ -284,6 +289,44 @@ impl State {
             Content::Nothing | Content::FirstFrame(_) => 1,
             Content::Capture(scene) => scene.of.0.frames().max(1),
             Content::Loom(scene, _) => scene.of.0.frames().max(1),
+            Content::Keys(keys) => keys.motion().frames().len().max(1),
+            Content::Poses(poses) => poses.poses.of.0.frames().max(1),
+        }
+    }
+
+    /// Key poses and the motion through them, where that is what is open.
+    pub(super) fn keys(&self) -> Option<&KeyScene> {
+        match &self.content {
+            Content::Keys(keys) => Some(keys),
+            _ => None,
+        }
+    }
+
+    /// Poses and their principal components, where those are open.
+    pub(super) fn poses(&self) -> Option<&PoseScene> {
+        match &self.content {
+            Content::Poses(poses) => Some(poses),
+            _ => None,
+        }
+    }
+
+    /// Where a frame lies on the axis of time: the time of a motion through keys, else the frame itself.
+    pub(super) fn on_axis(&self, t: f64) -> f64 {
+        self.keys().map_or(t, |keys| keys.motion().time_at(t))
+    }
+
+    /// The frame at a place of the axis of time.
+    pub(super) fn off_axis(&self, time: f64) -> f64 {
+        self.keys()
+            .map_or(time, |keys| keys.motion().frame_at(time))
+    }
+
+    /// Whether places of the map off its curve have shapes.
+    pub(super) fn roams(&self) -> bool {
+        match &self.content {
+            Content::Loom(..) | Content::Poses(_) => true,
+            Content::Keys(keys) => keys.motion().motion().report().ghost.is_none(),
+            _ => false,
         }
     }
 
@@ -293,6 +336,8 @@ impl State {
             Content::Nothing => None,
             Content::FirstFrame(scene) | Content::Capture(scene) => scene.of.0.fps(),
             Content::Loom(scene, _) => scene.of.0.fps(),
+            Content::Keys(keys) => keys.fps(),
+            Content::Poses(poses) => poses.poses.of.0.fps(),
         };
         known.unwrap_or(DEFAULT_FPS)
     }
@@ -305,17 +350,29 @@ impl State {
         }
     }
 
-    /// The loom's plots, once there is one.
+    /// What the plots show, once there is something.
     pub(super) fn signals(&self) -> Option<&Same<Signals>> {
         match &self.content {
             Content::Loom(_, signals) => Some(signals),
+            Content::Keys(keys) => Some(&keys.signals),
+            Content::Poses(poses) => Some(&poses.signals),
             _ => None,
         }
     }
 
     /// Where the cursor stands on the map: off the curve, or at f(t).
     pub(super) fn cursor(&self) -> Option<[f64; 2]> {
-        let on_curve = || self.loom()?.position_at(self.playback.t).ok();
+        let t = self.playback.t;
+        let on_curve = || match &self.content {
+            Content::Loom(scene, _) => scene.of.0.position_at(t).ok(),
+            Content::Keys(keys) => Some(keys.motion().place(keys.motion().time_at(t))),
+            Content::Poses(poses) => {
+                let last = poses.poses.of.0.frames().saturating_sub(1);
+                let pose = (t.round().max(1.0) as usize - 1).min(last);
+                Some(poses.found.of.0.place(pose))
+            }
+            _ => None,
+        };
         self.roaming.or_else(on_curve)
     }
 

@@ -426,11 +426,7 @@ fn start_opening(
 fn shown_frames(content: &Content, span: Span) -> Option<Result<Box<dyn FrameSource>>> {
     match content {
         Content::Nothing | Content::FirstFrame(_) => None,
-        Content::Capture(scene) => {
-            let first = span.from.ceil() as usize - 1;
-            let last = (span.to.floor() as usize).clamp(first + 1, scene.of.0.frames());
-            Some(Ok(Box::new(scene.of.0.slice(first..last))))
-        }
+        Content::Capture(scene) => Some(Ok(within(scene, span))),
         Content::Loom(scene, _) => {
             let loom = &scene.of.0;
             let count = (span.to - span.from + 1e-9) as usize;
@@ -441,7 +437,16 @@ fn shown_frames(content: &Content, span: Span) -> Option<Result<Box<dyn FrameSou
             };
             Some(Ok(Box::new(Sampled::new(Loom::clone(loom), sampling))))
         }
+        Content::Keys(keys) => Some(Ok(within(keys.frames.as_ref()?, span))),
+        Content::Poses(poses) => Some(Ok(within(&poses.poses, span))),
     }
+}
+
+/// The frames of a span.
+fn within(scene: &Scene<Sequence>, span: Span) -> Box<dyn FrameSource> {
+    let first = span.from.ceil() as usize - 1;
+    let last = (span.to.floor() as usize).clamp(first + 1, scene.of.0.frames());
+    Box::new(scene.of.0.slice(first..last))
 }
 
 /// First frame, all frames, what the recipe makes of them: each is shown as soon as it is there.
@@ -466,6 +471,9 @@ fn open(files: &dyn Files, desk: &dyn Desk, events: &Sender<Event>, task: &Task)
     match files.open(task)?.unpack(&mut warnings) {
         Opened::Loom(loom) => show(stage::loom(loom)?, warnings),
         Opened::Capture(sequence) => {
+            if let Some(recipe) = desk.suited(&sequence) {
+                say(Answer::Hands(Reply::Found(recipe, false, desk.kept())));
+            }
             if let Some(content) = stage::frames(sequence)? {
                 show(content, warnings);
             }

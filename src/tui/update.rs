@@ -244,7 +244,10 @@ fn act(state: &mut State, action: Action) -> Vec<Command> {
         Action::Before => toggle(state, Aspect::Before),
         Action::Help => state.front = Some(Front::Help(0)),
         Action::Palette => state.front = Some(Front::Palette(String::new(), 0)),
-        Action::Leave => state.roaming = None,
+        Action::Leave => {
+            state.roaming = None;
+            state.hands.key = None;
+        }
         Action::SavePicture => return save_picture(state),
         Action::Export => return export(state),
         Action::Redraw => return vec![Command::Redraw],
@@ -284,7 +287,7 @@ fn change_speed(state: &mut State, by: isize) {
 
 /// Leaves the curve where it is, or returns to it.
 fn roam(state: &mut State) {
-    if state.roaming.take().is_none() {
+    if state.roaming.take().is_none() && state.roams() {
         state.playback.playing = false;
         state.roaming = state.cursor();
     }
@@ -362,19 +365,19 @@ fn save_picture(state: &mut State) -> Vec<Command> {
     let Some(wish) = panel.picture(state) else {
         say(
             state,
-            format!("the {} panel has no picture yet", panel.title()),
+            format!("the {} panel has no picture yet", panel.title_of(state)),
             true,
         );
         return Vec::new();
     };
     let frame = state.playback.t;
-    let name = format!("{}-{frame:.0}.png", panel.title().replace(' ', "-"));
+    let name = format!("{}-{frame:.0}.png", panel.title_of(state).replace(' ', "-"));
     vec![Command::SavePicture(name, wish)]
 }
 
 fn export(state: &mut State) -> Vec<Command> {
     match state.content {
-        Content::Capture(_) | Content::Loom(..) => {
+        Content::Capture(_) | Content::Loom(..) | Content::Keys(_) | Content::Poses(_) => {
             say(state, "writing frames ..".to_string(), false);
             vec![Command::Export(state.span())]
         }
@@ -489,10 +492,10 @@ fn point(state: &mut State, panel: usize, area: Rect, mouse: MouseEvent) {
     };
     let canvas = state.canvas(panel, area);
     let at = picture.pixel(canvas, (mouse.column, mouse.row));
-    if panel == TIME {
+    if panel == TIME && state.poses().is_none() {
         let t = picture.planes.first().map(|plane| plane.x.value(at[0]));
         if let Some(t) = t.filter(|t| t.is_finite()) {
-            scrub(state, t);
+            scrub(state, state.off_axis(t));
         }
     } else if panel == MAP
         && let Some(plane) = picture.planes.first()
@@ -502,7 +505,7 @@ fn point(state: &mut State, panel: usize, area: Rect, mouse: MouseEvent) {
             Some(t) => scrub(state, t),
             None => {
                 state.playback.playing = false;
-                state.roaming = Some(plane.data(at)).filter(|_| state.loom().is_some());
+                state.roaming = Some(plane.data(at)).filter(|_| state.roams());
             }
         }
     }

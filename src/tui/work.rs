@@ -17,9 +17,10 @@ use super::thumbs::Thumb;
 use crate::image::Image;
 use crate::loom::{Loom, Scratch};
 use crate::mesh::{Bounds, FrameSource, Sequence, Topology};
+use crate::pipeline::{KeyMotion, Statistics};
 use crate::plot::{
     self, Chart, Panel, Plane, Series, Theme, TimeSignals, Tint, chart, pose_space, raster,
-    time_signals,
+    spectrum, time_signals,
 };
 use crate::view::{Camera, Renderer, Style, Surface, Wire};
 
@@ -52,9 +53,13 @@ pub(super) enum Subject {
         window: Option<[[f64; 2]; 2]>,
         span: Option<[f64; 2]>,
         thumbs: Option<Same<Vec<Thumb>>>,
+        /// Tangents of a key in hand: from where to where.
+        arms: Vec<[[f64; 2]; 2]>,
     },
     /// The signals over time.
     Times(Same<Signals>),
+    /// The shares of the modes of poses.
+    Shares(Scene<Statistics>),
     /// The mesh.
     Mesh {
         pose: Pose,
@@ -75,6 +80,12 @@ pub(super) enum Pose {
     Time(Scene<Loom>, f64),
     /// g at a place of the map.
     Place(Scene<Loom>, [f64; 2]),
+    /// A motion through keys at a time.
+    Motion(Scene<KeyMotion>, f64),
+    /// A place of the plane of keys.
+    KeyPlace(Scene<KeyMotion>, [f64; 2]),
+    /// A place of the plane of the first two modes.
+    Modes(Scene<Statistics>, [f64; 2]),
 }
 
 /// A picture and where data lies in it.
@@ -123,11 +134,16 @@ impl Brush {
                 window,
                 span,
                 thumbs,
+                arms,
             } => {
                 let mut map = signals.0.map.clone();
                 (map.window, map.span) = (*window, *span);
+                map.arms.clone_from(arms);
                 if let Some(thumbs) = thumbs {
                     map.pictures.clone_from(&thumbs.0);
+                }
+                if map.curve.is_empty() {
+                    map.window = Some(map.window.unwrap_or_else(|| map.ranges()));
                 }
                 if wish.text == 0.0 {
                     // Marks are letters on top.
@@ -142,6 +158,10 @@ impl Brush {
             }
             Subject::Times(signals) if wish.text == 0.0 && wish.size.1 < ALL_SIGNALS => {
                 let (scene, planes) = chart(&coarse(&signals.0.times), width, height, &theme);
+                picture(&scene, planes, fine)
+            }
+            Subject::Shares(scene) => {
+                let (scene, planes) = spectrum(&scene.of.0.shares(), width, height, &theme);
                 picture(&scene, planes, fine)
             }
             Subject::Times(signals) => {
@@ -254,6 +274,17 @@ impl Brush {
                 Ok(positions) => self.positions = positions,
                 Err(_) => return,
             },
+            Pose::Motion(scene, time) => {
+                narrow(&scene.of.0.motion().at(*time), &mut self.positions)
+            }
+            Pose::KeyPlace(scene, at) => match scene.of.0.shape_of(*at) {
+                Some(positions) => narrow(&positions, &mut self.positions),
+                None => return,
+            },
+            Pose::Modes(scene, at) => match scene.of.0.shape_of(*at) {
+                Ok(shape) => self.positions = shape.output.positions,
+                Err(_) => return,
+            },
         }
         let surface = Surface {
             triangles: topology.triangles(),
@@ -261,6 +292,13 @@ impl Brush {
             colours: (self.colours.len() == topology.vertices()).then_some(&self.colours),
         };
         self.renderer.overlay(surface, camera, style, image);
+    }
+}
+
+/// Positions in single precision.
+fn narrow(wide: &[f64], positions: &mut [f32]) {
+    for (narrow, wide) in positions.iter_mut().zip(wide) {
+        *narrow = *wide as f32;
     }
 }
 
@@ -322,6 +360,8 @@ impl Pose {
         match self {
             Pose::Frame(scene, _) => scene.bounds,
             Pose::Time(scene, _) | Pose::Place(scene, _) => scene.bounds,
+            Pose::Motion(scene, _) | Pose::KeyPlace(scene, _) => scene.bounds,
+            Pose::Modes(scene, _) => scene.bounds,
         }
     }
 
@@ -329,6 +369,8 @@ impl Pose {
         match self {
             Pose::Frame(scene, _) => scene.of.0.topology(),
             Pose::Time(scene, _) | Pose::Place(scene, _) => scene.of.0.topology(),
+            Pose::Motion(scene, _) | Pose::KeyPlace(scene, _) => scene.of.0.topology(),
+            Pose::Modes(scene, _) => scene.of.0.topology(),
         }
     }
 }

@@ -4,7 +4,8 @@ use ratatui::crossterm::event::KeyEvent;
 
 use super::held::{Held, Moment, Spot, cancel, drop, shift, take};
 use super::runner::Run;
-use super::{Errand, sliders};
+use super::{Errand, keys, sliders};
+use crate::recipe::Make;
 use crate::recipe::gesture::{Gesture, write};
 use crate::tui::event::Command;
 use crate::tui::keys::{Action, named};
@@ -67,6 +68,9 @@ pub(super) fn scroll(state: &mut State, lines: isize) {
 }
 
 fn held_key(state: &mut State, name: &str) -> Option<Vec<Command>> {
+    if let Some(commands) = keys::pressed(state, name) {
+        return Some(commands);
+    }
     let (far, arrow) = match name.strip_prefix("shift-") {
         Some(arrow) => (10.0, arrow),
         None => (1.0, name),
@@ -135,6 +139,10 @@ pub(in crate::tui) fn act(state: &mut State, action: Action) -> Vec<Command> {
         Action::EditRecipe => vec![Command::Hands(Errand::Edit)],
         Action::TakeUp => take_up(state),
         Action::Forget => forget(state),
+        Action::MakeLoom => gesture(state, &Gesture::Make(Make::Loom)),
+        Action::MakeMotion => gesture(state, &Gesture::Make(Make::Motion)),
+        Action::MakeStatistics => gesture(state, &Gesture::Make(Make::Statistics)),
+        _ if state.keys().is_some() => keys::act(state, action).unwrap_or_default(),
         _ if state.loom().is_none() || state.hands.good.is_none() => {
             say(state, "there is no loom to edit yet", true);
             Vec::new()

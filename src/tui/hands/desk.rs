@@ -4,6 +4,7 @@
 use std::path::PathBuf;
 
 use crate::diag::Result;
+use crate::mesh::Sequence;
 use crate::recipe::{Failure, Outcome, Recipe};
 use crate::task::Task;
 
@@ -24,6 +25,12 @@ pub trait Desk: Send + Sync {
     /// # Errors
     /// It cannot be read.
     fn recipe(&self) -> Result<(Recipe, bool)>;
+
+    /// The recipe that suits these frames better than the one that was begun with before they were known;
+    /// none where there is none, or where the recipe is somebody's own.
+    fn suited(&self, _frames: &Sequence) -> Option<Recipe> {
+        None
+    }
 
     /// Writes `text` to the recipe's file, which it gets if it has none; never over what somebody else has
     /// written meanwhile.

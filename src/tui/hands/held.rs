@@ -7,7 +7,8 @@ use crate::recipe::{Param, Setting};
 use crate::signal::warp::{Keys, Warp};
 use crate::tui::state::{Content, State};
 
-use super::trial::{Try, What};
+use super::keys::KeyHeld;
+use super::trial::{Base, Try, What};
 use super::{Errand, sliders};
 use crate::tui::event::Command;
 use crate::tui::panels::map;
@@ -27,6 +28,8 @@ pub(in crate::tui) enum Held {
     Slider(Param, Setting),
     /// A stretch of time that is being marked, from here.
     Marks(f64),
+    /// A key pose.
+    Key(KeyHeld),
 }
 
 /// A place of the map, and whether it is another than at first.
@@ -134,6 +137,7 @@ impl Held {
             Held::Sketch(points, _) => points.len() > 1,
             Held::Slider(param, value) => param.value != *value,
             Held::Marks(_) => false,
+            Held::Key(held) => held.moved(),
         }
     }
 
@@ -159,6 +163,7 @@ impl Held {
                 value: value.clone(),
             }),
             Held::Marks(_) => None,
+            Held::Key(held) => Some(held.gesture()),
         }
     }
 
@@ -174,6 +179,7 @@ impl Held {
             Held::Moment(moment) => What::Edit(Edit::Retime {
                 keys: moment.keys.clone(),
             }),
+            Held::Key(held) => held.what(),
             Held::Sketch(..) | Held::Slider(..) | Held::Marks(_) => return None,
         })
     }
@@ -193,6 +199,7 @@ impl Held {
             Held::Sketch(points, _) => format!("sketch of {} points", points.len()),
             Held::Slider(param, value) => format!("{} = {value}", param.name),
             Held::Marks(from) => format!("marks from {from:.2}"),
+            Held::Key(held) => held.words(),
         }
     }
 }
@@ -200,7 +207,8 @@ impl Held {
 /// Takes something in hand: the map's view stays where it is meanwhile.
 pub(super) fn take(state: &mut State, held: Held) {
     state.playback.playing = false;
-    if state.window.is_none() && state.signals().is_some() && held.place().is_some() {
+    let on_map = held.place().is_some() || matches!(held, Held::Key(_));
+    if state.window.is_none() && state.signals().is_some() && on_map {
         state.window = Some(map::window(state));
         state.hands.frozen = true;
     }
@@ -220,7 +228,7 @@ pub(super) fn shift(state: &mut State, place: [f64; 2], time: f64) -> Vec<Comman
         Held::Control(_, spot) | Held::Pin(_, spot) => spot.to(place),
         Held::Moment(moment) => moment.to(time),
         Held::Sketch(points, _) => points.push(place),
-        Held::Slider(..) | Held::Marks(_) => {}
+        Held::Slider(..) | Held::Marks(_) | Held::Key(_) => {}
     }
     show(state)
 }
@@ -231,13 +239,27 @@ fn show(state: &mut State) -> Vec<Command> {
     let Some(what) = held.filter(|held| held.moved()).and_then(Held::what) else {
         return Vec::new();
     };
-    let Some(Content::Loom(base, _)) = &state.hands.good else {
-        return Vec::new();
+    try_out(state, what)
+}
+
+/// The same where it may be back at where it was.
+pub(super) fn preview(state: &mut State) -> Vec<Command> {
+    match state.hands.held.as_ref().and_then(Held::what) {
+        Some(what) => try_out(state, what),
+        None => Vec::new(),
+    }
+}
+
+fn try_out(state: &mut State, what: What) -> Vec<Command> {
+    let base = match &state.hands.good {
+        Some(Content::Loom(base, _)) => Base::Loom(base.clone()),
+        Some(Content::Keys(keys)) => Base::Keys(keys.clone()),
+        _ => return Vec::new(),
     };
     state.hands.tries += 1;
     vec![Command::Hands(Errand::Try(Try {
         number: state.hands.tries,
-        base: base.clone(),
+        base,
         what,
     }))]
 }
@@ -250,15 +272,24 @@ pub(super) fn drop(state: &mut State) -> Vec<Command> {
     match (&held, held.gesture()) {
         (Held::Slider(param, value), _) => sliders::set(state, param, value),
         (_, Some(gesture)) if held.moved() => super::act::gesture(state, &gesture),
+        // What was moved and moved back.
+        (Held::Key(_), _) => {
+            shown_again(state);
+            Vec::new()
+        }
         _ => Vec::new(),
     }
 }
 
 /// Forgets what is in hand: the last good result is shown again.
 pub(super) fn cancel(state: &mut State) {
-    if release(state).is_some()
-        && let Some(good) = &state.hands.good
-    {
+    if release(state).is_some() {
+        shown_again(state);
+    }
+}
+
+fn shown_again(state: &mut State) {
+    if let Some(good) = &state.hands.good {
         state.content = good.clone();
     }
 }

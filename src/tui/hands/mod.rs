@@ -9,6 +9,7 @@ mod act;
 mod desk;
 mod held;
 mod history;
+mod keys;
 mod pointer;
 mod replies;
 mod runner;
@@ -27,6 +28,8 @@ pub(super) use trial::Try;
 
 use std::path::PathBuf;
 
+#[cfg(test)]
+mod key_tests;
 #[cfg(test)]
 mod tests;
 
@@ -78,10 +81,12 @@ pub(super) struct Hands {
     pub(super) page: Page,
     /// What is in hand.
     pub(super) held: Option<Held>,
+    /// The key pose that is chosen, from 0.
+    pub(super) key: Option<usize>,
     /// Earlier and later texts.
     history: History,
     /// What the last run that succeeded gave.
-    good: Option<Content>,
+    pub(super) good: Option<Content>,
     /// Whether frames can be pinned: the loom's frames are known.
     pinnable: bool,
     /// Parameters set without being written.

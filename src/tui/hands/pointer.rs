@@ -5,7 +5,7 @@ use ratatui::layout::Rect;
 
 use super::act::{can_pin, scroll, take_moment};
 use super::held::{Held, Spot, cancel, drop, shift, take};
-use super::sliders;
+use super::{keys, sliders};
 use crate::loom::Loom;
 use crate::tui::event::Command;
 use crate::tui::panels::{MAP, RECIPE, TIME};
@@ -59,7 +59,11 @@ fn press(state: &mut State, mouse: MouseEvent, button: MouseButton) -> Option<Ve
         || mouse
             .modifiers
             .intersects(KeyModifiers::ALT | KeyModifiers::CONTROL);
+    if keys::press(state, panel, &spot, button, aside) {
+        return Some(taken(state, panel));
+    }
     match (panel, button) {
+        (TIME, MouseButton::Right) | (MAP, _) if state.loom().is_none() => return None,
         (MAP, MouseButton::Left) if sketching => {
             state.hands.held = Some(Held::Sketch(vec![spot.place], true));
             state.roaming = Some(spot.place);
@@ -97,6 +101,7 @@ fn drag(state: &mut State, mouse: MouseEvent) -> Option<Vec<Command>> {
         Held::Moment(_) | Held::Marks(_) => TIME,
         Held::Control(..) | Held::Pin(..) | Held::Sketch(_, true) => MAP,
         Held::Sketch(_, false) => return None,
+        Held::Key(held) => held.panel()?,
     };
     let (_, area) = state.places().into_iter().find(|(at, _)| *at == panel)?;
     let area = state.canvas(panel, area);
@@ -106,9 +111,13 @@ fn drag(state: &mut State, mouse: MouseEvent) -> Option<Vec<Command>> {
     let picture = state.slots[panel].shown.clone()?;
     let spot = Pointed::at(&picture, area, mouse)?;
     let [x, y] = spot.place;
+    if matches!(state.hands.held, Some(Held::Key(_))) {
+        return Some(keys::dragged(state, [x, y]));
+    }
     if let Some(Held::Marks(from)) = state.hands.held {
         let last = state.frames() as f64;
-        let ends = [from.min(x), from.max(x)].map(|t| Some(t.round().clamp(1.0, last)));
+        let frames = [from.min(x), from.max(x)].map(|t| state.off_axis(t));
+        let ends = frames.map(|t| Some(t.round().clamp(1.0, last)));
         state.playback.marks = ends;
         return Some(Vec::new());
     }
@@ -127,6 +136,7 @@ fn drag(state: &mut State, mouse: MouseEvent) -> Option<Vec<Command>> {
 fn release(state: &mut State, mouse: MouseEvent) -> Option<Vec<Command>> {
     match state.hands.held.as_ref()? {
         Held::Sketch(_, false) => None,
+        Held::Key(_) => Some(keys::let_go(state)),
         Held::Control(..) if !state.hands.held.as_ref()?.moved() => {
             // A click goes to the time there, as anywhere on the curve.
             cancel(state);
@@ -218,13 +228,13 @@ fn nearest(points: impl Iterator<Item = [f64; 2]>, spot: &Pointed) -> Option<(us
 }
 
 /// Where the mouse points in the first plane of a picture.
-struct Pointed<'a> {
+pub(super) struct Pointed<'a> {
     picture: &'a Picture,
     /// Pixels of a cell, across and down.
     cell: [f32; 2],
     at: [f32; 2],
     /// The same in the plane's data.
-    place: [f64; 2],
+    pub(super) place: [f64; 2],
 }
 
 impl<'a> Pointed<'a> {
@@ -243,7 +253,7 @@ impl<'a> Pointed<'a> {
     }
 
     /// How far a point of the data is, in cells; half as much upright, where cells are twice as long.
-    fn distance(&self, point: [f64; 2]) -> f64 {
+    pub(super) fn distance(&self, point: [f64; 2]) -> f64 {
         let Some(plane) = self.picture.planes.first() else {
             return f64::INFINITY;
         };

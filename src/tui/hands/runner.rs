@@ -10,10 +10,11 @@ use super::desk::{Desk, Kept};
 use super::trial::{Trials, Try};
 use super::{Errand, Reply};
 use crate::diag::{Diagnostic, Result};
-use crate::pipeline::{LoomValue, Value};
+use crate::pipeline::{KeyMotion, LoomValue, Value};
 use crate::recipe::{Outcome, Param, Recipe};
 use crate::task::{Cancelled, Task};
 use crate::tui::event::{Answer, Event};
+use crate::tui::posed;
 use crate::tui::stage;
 use crate::tui::state::Content;
 use crate::tui::work::start;
@@ -133,6 +134,7 @@ impl Workers {
         let (desk, runs) = (Arc::clone(&self.desk), Arc::clone(&self.runs));
         let present = Arc::clone(&self.present);
         start("recipe", move || {
+            let mut last = None;
             loop {
                 let mut run = runs.next();
                 let say = |reply| events.send(Event::Answer(Answer::Hands(reply))).is_ok();
@@ -147,7 +149,7 @@ impl Workers {
                 }
                 let task = task.sibling();
                 *present.lock().unwrap_or_else(PoisonError::into_inner) = task.clone();
-                let ran = catch_unwind(AssertUnwindSafe(|| ran(&*desk, &run, &task)));
+                let ran = catch_unwind(AssertUnwindSafe(|| ran(&*desk, &run, &mut last, &task)));
                 let ran = ran.unwrap_or_else(|_| {
                     Diagnostic::error("the recipe made the program fail: this is a mistake of ours")
                         .err()
@@ -207,15 +209,27 @@ fn write(desk: &dyn Desk, run: &Run) -> Reply {
     }
 }
 
-fn ran(desk: &dyn Desk, run: &Run, task: &Task) -> Result<Box<Ran>> {
+fn ran(
+    desk: &dyn Desk,
+    run: &Run,
+    last: &mut Option<Arc<KeyMotion>>,
+    task: &Task,
+) -> Result<Box<Ran>> {
     let outcome = desk
         .run(&run.recipe, &run.settings, task)
         .map_err(|failure| failure.diagnostic)?;
     task.check().map_err(|Cancelled| Cancelled)?;
-    let loom = loom_of(&outcome);
+    let (loom, names) = (loom_of(&outcome), outcome.names.clone());
     let content = match (&outcome.value, &loom) {
         (_, Some(loom)) => Some(stage::loom(Arc::clone(&loom.loom.value))?),
-        (Value::Sequence(frames), None) => stage::frames((*frames.value).clone())?,
+        (Value::Sequence(frames), None) => {
+            let frames = (*frames.value).clone();
+            match outcome.completed.clone() {
+                Some(completion) => posed::keys(completion, names, frames, last, task)?,
+                None => posed::frames(frames, names, task)?,
+            }
+        }
+        (Value::Statistics(found), None) => posed::poses(Arc::clone(&found.value), names)?,
         (Value::Shape(shape), None) => stage::frames(shape.value.sequence())?,
         _ => None,
     };

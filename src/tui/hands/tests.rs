@@ -30,8 +30,8 @@ fn result(frames: usize) -> Result<Box<Ran>, Box<Diagnostic>> {
     }))
 }
 
-/// A studio whose recipe has been run once, with all pictures drawn.
-fn studio() -> State {
+/// A studio with this recipe, and the commands that its first run is among.
+pub(super) fn open_recipe(text: &str) -> (State, Vec<Command>) {
     let cell = CellSize {
         width: 2,
         height: 4,
@@ -45,20 +45,26 @@ fn studio() -> State {
     let mut state = State::new("ring".into(), (120, 36), cell, look);
     let recipe = Recipe {
         path: PathBuf::from("r.rhai"),
-        text: START.into(),
+        text: text.into(),
     };
     tell(&mut state, Reply::Found(recipe, true, None));
     let commands = tell(&mut state, Reply::Ready);
+    (state, commands)
+}
+
+/// A studio whose recipe has been run once, with all pictures drawn.
+fn studio() -> State {
+    let (mut state, commands) = open_recipe(START);
     let number = run_of(&commands).unwrap().number;
     tell(&mut state, Reply::Ran(number, result(15)));
     state
 }
 
-fn tell(state: &mut State, reply: Reply) -> Vec<Command> {
+pub(super) fn tell(state: &mut State, reply: Reply) -> Vec<Command> {
     send(state, Event::Answer(Answer::Hands(reply)))
 }
 
-fn send(state: &mut State, event: Event) -> Vec<Command> {
+pub(super) fn send(state: &mut State, event: Event) -> Vec<Command> {
     let mut others = Vec::new();
     for command in update(state, event) {
         match command {
@@ -81,15 +87,19 @@ fn send(state: &mut State, event: Event) -> Vec<Command> {
     others
 }
 
-fn press(state: &mut State, code: KeyCode) -> Vec<Command> {
+pub(super) fn press(state: &mut State, code: KeyCode) -> Vec<Command> {
     send(state, Event::Key(KeyEvent::new(code, KeyModifiers::NONE)))
 }
 
-fn letter(state: &mut State, letter: char) -> Vec<Command> {
+pub(super) fn letter(state: &mut State, letter: char) -> Vec<Command> {
     press(state, KeyCode::Char(letter))
 }
 
-fn mouse(state: &mut State, kind: MouseEventKind, (column, row): (u16, u16)) -> Vec<Command> {
+pub(super) fn mouse(
+    state: &mut State,
+    kind: MouseEventKind,
+    (column, row): (u16, u16),
+) -> Vec<Command> {
     let modifiers = KeyModifiers::NONE;
     let event = MouseEvent {
         kind,
@@ -101,7 +111,7 @@ fn mouse(state: &mut State, kind: MouseEventKind, (column, row): (u16, u16)) -> 
 }
 
 /// The run that was asked for.
-fn run_of(commands: &[Command]) -> Option<&Run> {
+pub(super) fn run_of(commands: &[Command]) -> Option<&Run> {
     commands.iter().find_map(|command| match command {
         Command::Hands(Errand::Run(run)) => Some(run),
         _ => None,
@@ -109,14 +119,14 @@ fn run_of(commands: &[Command]) -> Option<&Run> {
 }
 
 /// The text that was asked to be written.
-fn written(commands: &[Command]) -> String {
+pub(super) fn written(commands: &[Command]) -> String {
     let run = run_of(commands).expect("a run");
     assert!(run.save);
     run.recipe.text.clone()
 }
 
 /// The cell of a panel on which a point of its first plane lies.
-fn cell(state: &State, panel: usize, point: [f64; 2]) -> (u16, u16) {
+pub(super) fn cell(state: &State, panel: usize, point: [f64; 2]) -> (u16, u16) {
     let places = state.places();
     let (_, area) = places.iter().find(|(at, _)| *at == panel).unwrap();
     let area = state.canvas(panel, *area);

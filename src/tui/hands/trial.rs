@@ -7,8 +7,10 @@ use crate::diag::Result;
 use crate::edit::Edit;
 use crate::loom::Loom;
 use crate::loom::session::Session;
+use crate::pipeline::KeyControls;
 use crate::signal::time::TimeSignal;
 use crate::task::Task;
+use crate::tui::posed::KeyScene;
 use crate::tui::stage;
 use crate::tui::state::{Content, Same, Scene};
 
@@ -17,8 +19,17 @@ use crate::tui::state::{Content, Same, Scene};
 pub(in crate::tui) struct Try {
     pub(in crate::tui) number: u64,
     /// What it is done to.
-    pub(in crate::tui) base: Scene<Loom>,
+    pub(in crate::tui) base: Base,
     pub(in crate::tui) what: What,
+}
+
+/// What something is done to.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::tui) enum Base {
+    /// A loom.
+    Loom(Scene<Loom>),
+    /// A motion through key poses.
+    Keys(KeyScene),
 }
 
 /// What is done.
@@ -30,6 +41,8 @@ pub(in crate::tui) enum What {
     RetimeAgain(Vec<[f64; 2]>),
     /// A frame (from 0) held at a place of the map.
     Pin(usize, [f64; 2]),
+    /// Other times and handles of key poses.
+    Keys(KeyControls),
 }
 
 /// Previews, and the session of the pin that is being dragged.
@@ -44,7 +57,13 @@ impl Trials {
     /// # Errors
     /// Those of the edit.
     pub(super) fn show(&mut self, question: Try) -> Result<Content> {
-        let Try { base, what, .. } = question;
+        let (base, what) = match (question.base, question.what) {
+            (Base::Keys(keys), What::Keys(controls)) => {
+                return keys.with(&controls, &Task::default());
+            }
+            (Base::Keys(keys), _) => return Ok(Content::Keys(keys)),
+            (Base::Loom(base), what) => (base, what),
+        };
         let loom = &*base.of.0;
         let shown = match &what {
             What::Edit(edit) => edit.apply(loom)?.output,
@@ -55,6 +74,7 @@ impl Trials {
                     .output
             }
             What::Pin(frame, to) => self.pinned(&base.of, *frame, *to)?,
+            What::Keys(_) => loom.clone(),
         };
         Ok(stage::loom_within(Arc::new(shown), base.bounds))
     }
@@ -101,7 +121,7 @@ mod tests {
         };
         let question = Try {
             number: 1,
-            base,
+            base: Base::Loom(base),
             what,
         };
         match Trials::default().show(question).unwrap() {

@@ -2,10 +2,11 @@
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
-use ratatui::text::Line;
+use ratatui::style::Style;
+use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Widget, Wrap};
 
-use super::Panel;
+use super::{Panel, posed};
 use crate::loom::Loom;
 use crate::tui::state::State;
 use crate::tui::theme::Role;
@@ -26,15 +27,13 @@ impl Panel for Details {
     fn draw(&self, state: &State, area: Rect, buffer: &mut Buffer) {
         let muted = state.look.style(Role::Muted);
         let lines: Vec<Line> = match state.loom() {
-            None => vec![Line::styled("no loom yet", muted)],
+            None => match posed::facts(state) {
+                Some(facts) => facts.into_iter().map(|fact| told(muted, fact)).collect(),
+                None => vec![Line::styled("no loom yet", muted)],
+            },
             Some(loom) => facts(loom)
                 .into_iter()
-                .map(|(name, value)| {
-                    Line::from_iter([
-                        ratatui::text::Span::styled(format!("{name:<18}"), muted),
-                        ratatui::text::Span::raw(value),
-                    ])
-                })
+                .map(|(name, value)| told(muted, (name.to_string(), value)))
                 .chain(
                     loom.report()
                         .spans
@@ -50,6 +49,10 @@ impl Panel for Details {
             .wrap(Wrap { trim: false })
             .render(area, buffer);
     }
+}
+
+fn told(muted: Style, (name, value): (String, String)) -> Line<'static> {
+    Line::from_iter([Span::styled(format!("{name:<18}"), muted), Span::raw(value)])
 }
 
 fn facts(loom: &Loom) -> Vec<(&'static str, String)> {

@@ -23,6 +23,7 @@ pub(super) fn draw(
         Some(Held::Control(_, spot)) => (vec![spot.at], "◈", "@"),
         Some(Held::Pin(_, spot)) => (vec![spot.at], "▼", "V"),
         Some(Held::Sketch(points, _)) => (points.clone(), "•", "*"),
+        Some(Held::Key(held)) => (held.place(state).into_iter().collect(), "◈", "@"),
         _ => return,
     };
     let symbol = if state.plain_letters { plain } else { symbol };

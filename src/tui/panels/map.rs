@@ -3,7 +3,7 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::{MAP, Panel, cell_of, gutter, hand, read_out};
+use super::{MAP, Panel, cell_of, gutter, hand, posed, read_out};
 use crate::plot::Plane;
 use crate::tui::state::{Content, State};
 use crate::tui::theme::Role;
@@ -18,16 +18,22 @@ impl Panel for Map {
         "pose space"
     }
 
+    fn title_of(&self, state: &State) -> &'static str {
+        posed::map_title(state).unwrap_or(self.title())
+    }
+
     fn subject(&self, state: &State) -> Option<Subject> {
         let signals = state.signals()?.clone();
         let span = state.span();
         let marked = state.playback.marks.iter().any(Option::is_some) && span.from < span.to;
         let marked = marked.then_some([span.from, span.to]);
+        let thumbs = state.thumbs.shown.clone();
         Some(Subject::Map {
             signals,
             window: state.window,
             span: hand::support(state).or(marked),
-            thumbs: state.thumbs.shown.clone().filter(|_| !state.thumbs.off),
+            thumbs: thumbs.filter(|_| !state.thumbs.off && state.loom().is_some()),
+            arms: posed::arms(state),
         })
     }
 
@@ -43,8 +49,9 @@ impl Panel for Map {
         gutter::draw(state, picture, area, canvas, buffer);
         let (panel, area) = (area, canvas);
         draw_marks(state, area, buffer);
+        posed::draw_numbers(state, picture, area, buffer);
         if let Some((frame, at)) = hovered_frame(state, area) {
-            let text = format!(" frame {frame} ");
+            let text = posed::named(state, frame).unwrap_or(format!(" frame {frame} "));
             let wide = text.chars().count() as u16;
             let left = (at.0 + 2)
                 .min(area.right().saturating_sub(wide))
@@ -70,10 +77,10 @@ impl Panel for Map {
         }
         hand::draw(state, picture, plane, area, buffer);
         let [x, y] = at;
-        let place = if state.roaming.is_some() {
-            "g at"
-        } else {
-            "f(t) ="
+        let place = match (state.roaming.is_some(), state.loom().is_some()) {
+            (true, true) => "g at",
+            (false, true) => "f(t) =",
+            (_, false) => "at",
         };
         let text = format!(" {place} {x:.4}, {y:.4} ");
         read_out(state, Role::Muted, &text, panel, buffer);
@@ -183,7 +190,8 @@ pub(in crate::tui) fn window(state: &State) -> [[f64; 2]; 2] {
     state.window.or_else(shown).unwrap_or([[0.0, 1.0]; 2])
 }
 
-/// The time at which the curve comes closest to a pixel, if it comes within `reach` pixels.
+/// The time at which the curve comes closest to a pixel, if it comes within `reach` pixels; without a
+/// curve, the nearest of the frames.
 pub(in crate::tui) fn nearest_time(
     state: &State,
     plane: &Plane,
@@ -195,10 +203,16 @@ pub(in crate::tui) fn nearest_time(
         let [x, y] = plane.pixel(*point);
         (x - at[0]).hypot(y - at[1])
     };
-    let nearest = map
+    let on_curve = map
         .times
         .iter()
-        .zip(map.curve.iter().map(distance))
-        .min_by(|(_, a), (_, b)| a.total_cmp(b))?;
-    (nearest.1 <= reach).then_some(*nearest.0)
+        .copied()
+        .zip(map.curve.iter().map(distance));
+    let frames = map.frames.iter().map(distance).enumerate();
+    let frames = frames.map(|(index, distance)| (index as f64 + 1.0, distance));
+    let nearest = match map.curve.is_empty() {
+        true => frames.min_by(|(_, a), (_, b)| a.total_cmp(b)),
+        false => on_curve.min_by(|(_, a), (_, b)| a.total_cmp(b)),
+    }?;
+    (nearest.1 <= reach).then_some(nearest.0)
 }

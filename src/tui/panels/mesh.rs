@@ -3,7 +3,7 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::{MESH, Panel, read_out};
+use super::{MESH, Panel, posed, read_out};
 use crate::mesh::{FrameSource, Sequence};
 use crate::tui::state::{Aspect, Content, Scene, State};
 use crate::tui::theme::Role;
@@ -31,6 +31,9 @@ impl Panel for Mesh {
             }
             (Content::Loom(scene, _), None) => Pose::Time(scene.clone(), t),
             (Content::Loom(scene, _), Some(at)) => Pose::Place(scene.clone(), at),
+            (Content::Keys(keys), at) => posed::motion(state, keys, at),
+            (Content::Poses(poses), Some(at)) => Pose::Modes(poses.found.clone(), at),
+            (Content::Poses(poses), None) => Pose::Frame(poses.poses.clone(), posed::pose(state)),
         };
         let (mut capture, mut before) = (None, None);
         match state.aspect {

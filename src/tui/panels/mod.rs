@@ -5,6 +5,7 @@ mod gutter;
 mod hand;
 pub(super) mod map;
 pub(super) mod mesh;
+mod posed;
 mod recipe;
 mod time;
 
@@ -21,6 +22,11 @@ pub(super) trait Panel: Sync {
     /// What stands on its border or tab.
     fn title(&self) -> &'static str;
 
+    /// What stands on its border, with what is open in mind.
+    fn title_of(&self, _: &State) -> &'static str {
+        self.title()
+    }
+
     /// What its picture shows; none where there is nothing to show yet, or never a picture.
     fn subject(&self, state: &State) -> Option<Subject>;
 
@@ -32,6 +38,8 @@ pub(super) trait Panel: Sync {
     /// Draws text and cursors on `area` over the picture.
     fn draw(&self, state: &State, area: Rect, buffer: &mut Buffer);
 }
+
+pub(super) use posed::{ends as arm_ends, words as posed_words};
 
 /// All panels, in the order of the tabs.
 pub(super) const PANELS: &[&dyn Panel] = &[
@@ -76,7 +84,7 @@ impl dyn Panel + '_ {
     /// The picture for a file.
     pub(super) fn picture(&self, state: &State) -> Option<Wish> {
         let subject = self.subject(state)?;
-        let size = if matches!(subject, Subject::Times(_)) {
+        let size = if matches!(subject, Subject::Times(_) | Subject::Shares(_)) {
             (1280, 720)
         } else {
             (1280, 960)

@@ -1,16 +1,21 @@
 //! What a person sees, as text that a person can read: whole screens in letters, kept beside this file.
 
+use std::sync::Arc;
+
 use ratatui::crossterm::event::KeyCode;
 
 use super::tests::{press, screen, send, studio_of};
 use crate::loom::fit::{FitOptions, fit};
-use crate::mesh::{Bounds, Sequence, Topology};
+use crate::mesh::{Bounds, FrameSource, Sequence, Topology};
+use crate::pipeline::CompleteRequest;
 use crate::pipeline::plot::plot_loom;
 use crate::recipe::Recipe;
 use crate::task::Task;
 use crate::tui::event::{Answer, Event};
 use crate::tui::graphics::{CellSize, Protocol};
 use crate::tui::hands::Reply;
+use crate::tui::posed::frames;
+use crate::tui::posed::test_scenes::motion;
 use crate::tui::state::{Content, Same, Scene, Signals, State};
 
 /// Frames of the bar's swing.
@@ -160,4 +165,57 @@ fn the_palette_finds_actions() {
 fn one_frame_is_a_point_and_no_curve() {
     let state = studio((120, 36), 1);
     insta::assert_snapshot!("one_frame_120x36", letters(&state));
+}
+
+/// Four of the bar's frames, far from each other, and stretched.
+fn poses() -> Sequence {
+    let all = bar(FRAMES);
+    let mut some = Vec::new();
+    for (frame, stretch) in [(0, 1.0), (4, 1.6), (10, 0.6), (13, 1.4)] {
+        let points = all.frame(frame).chunks_exact(3);
+        some.extend(points.flat_map(|at| [stretch * at[0], at[1], at[2]]));
+    }
+    Sequence::new(Arc::clone(all.topology()), some, None)
+}
+
+/// The studio in letters with something that a recipe made.
+fn studio_with(recipe: &str, size: (u16, u16), content: Content) -> State {
+    let mut state = studio_of("poses", size, CellSize::of(Protocol::Ascii));
+    state.plain_letters = true;
+    let recipe = Recipe {
+        path: "poses.rhai".into(),
+        text: recipe.into(),
+    };
+    let found = Reply::Found(recipe, true, None);
+    send(&mut state, Event::Answer(Answer::Hands(found)));
+    state.hands.good = Some(content.clone());
+    let opened = Answer::Opened(Box::new(content), Vec::new());
+    send(&mut state, Event::Answer(opened));
+    state
+}
+
+#[test]
+fn key_poses_are_points_with_the_spline_through_them() {
+    let request = CompleteRequest {
+        times: Some(vec![1.0, 20.0, 30.0, 49.0]),
+        bias: vec![0.0, 0.4, 0.0, 0.0],
+        ..CompleteRequest::default()
+    };
+    let recipe = "complete(input(), #{ times: [1, 20, 30, 49], bias: [0, 0.4, 0, 0] })\n";
+    let mut state = studio_with(recipe, (120, 36), motion(poses(), request));
+    keys(&mut state, "nn");
+    insta::assert_snapshot!("keys_120x36", letters(&state));
+    keys(&mut state, "t");
+    for _ in 0..5 {
+        press(&mut state, KeyCode::Right);
+    }
+    insta::assert_snapshot!("key_in_hand_120x36", letters(&state));
+}
+
+#[test]
+fn poses_are_points_by_their_first_modes() {
+    let content = frames(poses(), vec![], &Task::default()).unwrap().unwrap();
+    let mut state = studio_with("pca(input())\n", (240, 70), content);
+    press(&mut state, KeyCode::Right);
+    insta::assert_snapshot!("poses_240x70", letters(&state));
 }

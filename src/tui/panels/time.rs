@@ -3,7 +3,7 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::{Panel, TIME, gutter, read_out};
+use super::{Panel, TIME, gutter, posed, read_out};
 use crate::tui::hands::Held;
 use crate::tui::state::State;
 use crate::tui::theme::Role;
@@ -17,8 +17,15 @@ impl Panel for Time {
         "time signals"
     }
 
+    fn title_of(&self, state: &State) -> &'static str {
+        posed::time_title(state).unwrap_or(self.title())
+    }
+
     fn subject(&self, state: &State) -> Option<Subject> {
-        state.signals().cloned().map(Subject::Times)
+        match state.poses() {
+            Some(poses) => Some(Subject::Shares(poses.found.clone())),
+            None => state.signals().cloned().map(Subject::Times),
+        }
     }
 
     fn canvas(&self, state: &State, area: Rect) -> Rect {
@@ -32,9 +39,13 @@ impl Panel for Time {
         let canvas = self.canvas(state, area);
         gutter::draw(state, picture, area, canvas, buffer);
         let (panel, area) = (area, canvas);
+        if state.poses().is_some() {
+            return;
+        }
+        posed::draw_times(state, picture, area, buffer);
         for (mark, symbol) in state.playback.marks.iter().zip(["[", "]"]) {
             if let Some(t) = mark {
-                upright(picture, *t, area, |x, y| {
+                upright(picture, state.on_axis(*t), area, |x, y| {
                     if let Some(cell) = buffer.cell_mut((x, y)) {
                         cell.set_symbol(symbol)
                             .set_style(state.look.style(Role::Mark));
@@ -49,7 +60,7 @@ impl Panel for Time {
                 }
             });
         }
-        upright(picture, state.playback.t, area, |x, y| {
+        upright(picture, state.on_axis(state.playback.t), area, |x, y| {
             if let Some(cell) = buffer.cell_mut((x, y)) {
                 let line = if state.plain_letters { "|" } else { "│" };
                 cell.set_symbol(line)
@@ -67,6 +78,9 @@ impl Panel for Time {
 
 /// The signals at a time, in words.
 fn values(state: &State, t: f64) -> Option<String> {
+    if let Some(keys) = state.keys() {
+        return Some(posed::values(keys, t));
+    }
     let loom = state.loom()?;
     let t = t.clamp(1.0, loom.frames() as f64);
     let [x, y] = loom.position_at(t).ok()?;
@@ -83,7 +97,7 @@ fn values(state: &State, t: f64) -> Option<String> {
 }
 
 /// Visits the cells of a vertical line at a time, through all planes.
-fn upright(picture: &Picture, t: f64, area: Rect, mut visit: impl FnMut(u16, u16)) {
+pub(super) fn upright(picture: &Picture, t: f64, area: Rect, mut visit: impl FnMut(u16, u16)) {
     let (Some(first), Some(last)) = (picture.planes.first(), picture.planes.last()) else {
         return;
     };
