@@ -9,10 +9,15 @@
 //! shapes at its frames and sites are fitted again with the same sites, the branches of their rotations
 //! drawn from frame to frame as in a sequence. f is not touched.
 
+mod sight;
+mod sites;
+
 use std::sync::Arc;
 
 use nalgebra::Vector3;
 
+use self::sight::{Sight, take_branches_of};
+use self::sites::{between, sites_by_frame};
 use crate::diag::{Diagnostic, Result, Warned};
 use crate::loom::{FitReport, Layout, Loom, Parts};
 use crate::math::b_spline::Point;
@@ -36,10 +41,6 @@ const NEARLY_SAME: f64 = 0.02;
 /// Frames farther than this from what the examples span, relative to their distance from the reference,
 /// are reported.
 const OUTSIDE: f64 = 0.5;
-
-/// An example whose distance from a frame falls below this part of itself when it takes the frame's branches
-/// is that frame, whole turns away.
-const BRANCHES: f64 = 0.5;
 
 /// Where the loom's sites miss the shapes that the examples see by more than this (relative), the new map
 /// takes sites at frames too: the sites of an ordered fit serve its own coordinates.
@@ -116,92 +117,6 @@ pub fn transfer(loom: &Loom, examples: &Examples, task: &Task) -> Result<Warned<
         },
         warnings,
     })
-}
-
-/// A loom's shapes in coordinates about q_0.
-struct Sight<'a> {
-    loom: &'a Loom,
-    space: Arc<dyn ShapeSpace>,
-    /// Whether the loom's own coordinates are those about q_0.
-    own: bool,
-    /// The frame (from 0) nearest q_0, from which branches are drawn where the coordinates are not its own.
-    start: usize,
-}
-
-impl<'a> Sight<'a> {
-    fn new(loom: &'a Loom, sources: &[Vec<f64>]) -> Result<Self> {
-        let own = loom.space().is_identity() || loom.space().state().reference == sources[0];
-        let (space, start) = match own {
-            true => (Arc::clone(loom.space()), 0),
-            false => (
-                open(loom.topology(), loom.space().name(), sources)?,
-                nearest_frame(loom, &sources[0])?,
-            ),
-        };
-        Ok(Sight {
-            loom,
-            space,
-            own,
-            start,
-        })
-    }
-
-    /// The shape at a place of the map, its branches nearest those of `near` where they are not the loom's.
-    fn at(&self, p: Point, near: Option<&[f64]>) -> Vec<f64> {
-        let z = coordinates_at(self.loom, p);
-        if self.own {
-            return z;
-        }
-        let mut shape = vec![0.0; 3 * self.loom.topology().vertices()];
-        self.loom.space().decode(&z, &mut shape);
-        let mut seen = encoded(&*self.space, &shape);
-        if let Some(near) = near {
-            self.space.follow(near, &mut seen);
-        }
-        seen
-    }
-
-    /// Shows every frame (from 0), each with the branches of its neighbour: from `start` to the end, then
-    /// back to the beginning.
-    fn each_frame(&self, task: &Task, mut show: impl FnMut(usize, &[f64])) -> Result<()> {
-        let mut first: Option<Vec<f64>> = None;
-        let forth = self.start..self.loom.frames();
-        let mut before: Option<Vec<f64>> = None;
-        for frame in forth.chain((0..self.start).rev()) {
-            task.check()?;
-            if frame + 1 == self.start {
-                before = first.take();
-            }
-            let z = self.at(self.place(frame)?, before.as_deref());
-            show(frame, &z);
-            if frame == self.start {
-                first = Some(z.clone());
-            }
-            before = Some(z);
-        }
-        Ok(())
-    }
-
-    /// Where a frame (from 0) lies in the map.
-    fn place(&self, frame: usize) -> Result<Point> {
-        self.loom.position_at((frame + 1) as f64)
-    }
-}
-
-/// The frame of a loom (from 0) whose coordinates are nearest those of a shape, whole turns apart.
-fn nearest_frame(loom: &Loom, shape: &[f64]) -> Result<usize> {
-    let wanted = encoded(&**loom.space(), shape);
-    let mut nearest = (f64::INFINITY, 0);
-    for frame in 0..loom.frames() {
-        let z = coordinates_at(loom, loom.position_at((frame + 1) as f64)?);
-        let mut followed = wanted.clone();
-        loom.space().follow(&z, &mut followed);
-        let found = distance(&z, &followed);
-        if found < nearest.0 {
-            nearest = (found, frame);
-        }
-    }
-    Ok(nearest.1)
 }
 
 /// From coordinates of the source to those of the target.
@@ -443,38 +358,6 @@ fn encoded(space: &dyn ShapeSpace, shape: &[f64]) -> Vec<f64> {
     coordinates
 }
 
-/// h(g(p)).
-fn coordinates_at(loom: &Loom, p: Point) -> Vec<f64> {
-    let mut x = vec![0.0; loom.shape().modes()];
-    loom.pose().evaluate(p, &mut x);
-    let mut z = vec![0.0; loom.shape().dimension()];
-    loom.shape().evaluate(&x, &mut z);
-    z
-}
-
-/// Gives examples that are frames of the loom the branches of those frames. A sequence draws the branches
-/// of its rotations from frame to frame, an example has principal ones: the same shape may lie whole turns
-/// away. An example that no frame comes near but for branches keeps its own.
-fn take_branches_of(sight: &Sight, examples: &mut [Vec<f64>], task: &Task) -> Result<()> {
-    let mut found: Vec<(f64, Option<Vec<f64>>)> = vec![(f64::INFINITY, None); examples.len()];
-    sight.each_frame(task, |_, z| {
-        for (example, found) in examples.iter().zip(&mut found).skip(1) {
-            let mut followed = example.clone();
-            sight.space.follow(z, &mut followed);
-            let (after, before) = (distance(z, &followed), distance(z, example));
-            if after < BRANCHES * before && after < found.0 {
-                *found = (after, Some(followed));
-            }
-        }
-    })?;
-    for (example, (_, followed)) in examples.iter_mut().zip(found) {
-        if let Some(followed) = followed {
-            *example = followed;
-        }
-    }
-    Ok(())
-}
-
 /// The root mean square by which a pose signal misses rows, relative to the rows.
 fn missed(pose: &PoseSignal, rows: &Rows) -> f64 {
     let mut y = vec![0.0; rows.width];
@@ -489,41 +372,6 @@ fn missed(pose: &PoseSignal, rows: &Rows) -> f64 {
         size += norm(wanted).powi(2);
     }
     if size > 0.0 { (off / size).sqrt() } else { 0.0 }
-}
-
-/// Sites and those places of frames that are at least half a step of the motion from each of them and from
-/// each other: what lies closer, as strides laid over each other do, is for the least squares to even out.
-fn between(sites: &[Point], frames: &[Point]) -> Vec<Point> {
-    let mut steps: Vec<f64> = frames
-        .windows(2)
-        .map(|pair| apart(&pair[0], &pair[1]))
-        .collect();
-    steps.sort_by(f64::total_cmp);
-    let least = 0.5 * steps.get(steps.len() / 2).copied().unwrap_or(0.0);
-    let mut more = sites.to_vec();
-    for frame in frames {
-        if more.iter().all(|site| apart(site, frame) > least) {
-            more.push(*frame);
-        }
-    }
-    more
-}
-
-/// Sites of a map by the frame whose place is nearest.
-fn sites_by_frame(sites: &[Point], places: &[Point]) -> Vec<Vec<Point>> {
-    let mut by_frame = vec![Vec::new(); places.len()];
-    for &site in sites {
-        let from = |frame: &usize| apart(&places[*frame], &site);
-        let nearest = (0..places.len()).min_by(|a, b| from(a).total_cmp(&from(b)));
-        nearest
-            .into_iter()
-            .for_each(|frame| by_frame[frame].push(site));
-    }
-    by_frame
-}
-
-fn apart(a: &Point, b: &Point) -> f64 {
-    libm::hypot(a[0] - b[0], a[1] - b[1])
 }
 
 fn distance(a: &[f64], b: &[f64]) -> f64 {
