@@ -1,9 +1,9 @@
-//! Figures 6, 7 and 8 of Xia et al. 2019: how many faces a ghost needs. Three keys, 13 shapes with ghosts of
+//! Figures 7 and 8 of Xia et al. 2019: how many faces a ghost needs. Three keys, 13 shapes with ghosts of
 //! 0.5 to 24 thousand faces against the sequence without: the KG error (eq. 7), with and without the
 //! residual that keeps the keys, by the screened solve and by the direct lift, by deformation transfer to
 //! the letter (gradients only), and the time of a frame.
-//! The picture shows the 11th shape for each size, coloured by its distance from the one without a ghost,
-//! and the curves.
+//! The picture shows the ghosts of the 11th shape, the shape behind each, coloured by its distance from the
+//! one without a ghost, and the curves.
 //!
 //! ```text
 //! cargo run --release --example xia_ghost [CAPTURE] [--out FOLDER]
@@ -23,7 +23,7 @@ use meshloom::image::Image;
 use meshloom::inbetween::{
     CompleteOptions, GhostOptions, GhostSize, Keys, Lift, Motion, MotionFrames, complete,
 };
-use meshloom::mesh::{FrameSource, Sequence};
+use meshloom::mesh::{FrameSource, Sequence, Topology};
 use meshloom::metric;
 use meshloom::plot::{Chart, Panel, Scale, Scene, Series, Style, Theme, Tint, chart};
 use meshloom::task::Task;
@@ -72,29 +72,28 @@ fn draw(figure: &mut Figure) -> Result<()> {
     let height = SIDE + 2.0 * theme.text;
     let mut picture = Scene::new(
         SIDE * (SIZES.len() + 1) as f32,
-        height * sets.len() as f32 + 420.0,
+        2.0 * height * sets.len() as f32 + 420.0,
         theme.background,
     );
     let mut curves = Vec::new();
     for (at, (name, keys)) in sets.iter().enumerate() {
         let study = Study::of(keys)?;
         study.print(name);
+        let top = 2.0 * at as f32 * height;
+        let ghosts: Vec<_> = study.sizes.iter().map(|size| size.drawn(keys)).collect();
+        row(&mut picture, [SIDE, top], SIDE, &ghosts, &theme);
         let mut pictures = vec![("whole".to_string(), study.view(keys, None))];
         pictures.extend(study.sizes.iter().map(|size| {
-            let text = format!("{} faces, KG {:.1} %", size.faces, size.kg[0]);
-            (text, study.view(keys, Some(size)))
+            (
+                format!("KG {:.1} %", size.kg[0]),
+                study.view(keys, Some(size)),
+            )
         }));
-        row(
-            &mut picture,
-            [0.0, at as f32 * height],
-            SIDE,
-            &pictures,
-            &theme,
-        );
+        row(&mut picture, [0.0, top + height], SIDE, &pictures, &theme);
         study.hold_to(figure, name);
         curves.push((*name, study));
     }
-    let below = height * sets.len() as f32;
+    let below = 2.0 * height * sets.len() as f32;
     let scene = figure_8(&curves, SIDE * (SIZES.len() + 1) as f32, &theme);
     picture.place(scene, [0.0, below]);
     figure.picture(&picture)
@@ -112,8 +111,28 @@ struct Size {
     /// KG errors in percent, in the order of [`WAYS`].
     kg: [f64; 5],
     seconds: f64,
-    /// The shape that is shown.
+    /// The shape that is shown, and its ghost.
     shape: Vec<f32>,
+    ghost: Option<(Arc<Topology>, Vec<f64>)>,
+}
+
+impl Size {
+    /// The ghost and its name.
+    fn drawn(&self, keys: &Keys) -> (String, Arc<Image>) {
+        let view = looking(keys);
+        let picture = self.ghost.as_ref().map(|(topology, positions)| {
+            let positions: Vec<f32> = positions.iter().map(|&x| x as f32).collect();
+            let view = view.on(Arc::clone(topology));
+            view.picture(&positions, 2 * SIDE as usize, [110, 140, 200])
+        });
+        let side = 2 * SIDE as usize;
+        let picture = picture.unwrap_or_else(|| Arc::new(Image::new(side, side)));
+        (format!("{} faces", self.faces), picture)
+    }
+}
+
+fn looking(keys: &Keys) -> View {
+    View::looking(keys.poses(), [0.35, 0.15])
 }
 
 impl Study {
@@ -138,6 +157,7 @@ impl Study {
                 faces,
                 kg: std::array::from_fn(kg),
                 seconds: seconds(found[0].motion()),
+                ghost: found[0].motion().ghost_at(found[0].times()[SHOWN]),
                 shape,
             });
         }
@@ -203,7 +223,7 @@ impl Study {
     fn view(&self, keys: &Keys, size: Option<&Size>) -> Arc<Image> {
         let mut whole = vec![0.0; 3 * keys.poses().topology().vertices()];
         let _ = self.whole.read_frame(SHOWN, &mut whole);
-        let view = View::looking(keys.poses(), [0.35, 0.15]);
+        let view = looking(keys);
         let Some(size) = size else {
             return view.picture(&whole, 2 * SIDE as usize, [170, 170, 170]);
         };

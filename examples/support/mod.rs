@@ -186,6 +186,14 @@ impl View {
         }
     }
 
+    /// From the same place on another mesh.
+    pub(crate) fn on(&self, topology: Arc<Topology>) -> Self {
+        View {
+            topology,
+            ..self.clone()
+        }
+    }
+
     /// Yaw and pitch.
     pub(crate) fn direction(&self) -> [f64; 2] {
         [self.camera.yaw, self.camera.pitch]

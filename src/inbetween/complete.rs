@@ -6,18 +6,15 @@
 
 use std::sync::Arc;
 
-use rayon::prelude::*;
-
 use super::drift::Drift;
-use super::ghost::{Following, Ghost, GhostOptions};
-use super::keys::{Keys, same_faces, widened};
+use super::ends::{Boundary, check_velocities, drift};
+use super::ghost::{Ghost, GhostOptions};
+use super::keys::Keys;
 use super::motion::{Motion, MotionReport};
+use super::track::{Track, open_space, slices};
 use crate::diag::{Diagnostic, Result, Warned};
-use crate::math::cubic_spline::Ends;
-use crate::math::key_spline::{Controls, Handle, KeySpline};
-use crate::mesh::rigid_align::{mean, rigid};
-use crate::mesh::{Bounds, FrameSource, Topology, torn};
-use crate::space::{Fine, ShapeSpace, Spaces, follow_frames};
+use crate::math::key_spline::{Controls, Handle};
+use crate::mesh::{FrameSource, torn};
 use crate::task::Task;
 
 /// The space that takes the largest motions (X19 §4.2).
@@ -51,38 +48,6 @@ impl Default for CompleteOptions {
     }
 }
 
-/// What happens at the ends. Beyond the first and the last key natural and Hermite motions go on
-/// straight (X19 §3.2), periodic ones go round again.
-#[derive(Debug, Clone, Default)]
-pub enum Boundary {
-    /// Second derivatives 0: least bending.
-    #[default]
-    Natural,
-    /// The last key is the first again; both are passed smoothly.
-    Periodic {
-        /// The last key may be the first moved rigidly: that motion is split off and put back.
-        drift: bool,
-    },
-    /// Given velocities.
-    Hermite {
-        /// At the first key.
-        start: Option<Velocity>,
-        /// At the last key.
-        end: Option<Velocity>,
-    },
-}
-
-/// A velocity in the shape space: the difference of two shapes' coordinates over a time.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Velocity {
-    /// The shape that is left, 3V positions; none: the key itself.
-    pub from: Option<Vec<f32>>,
-    /// The shape that is reached.
-    pub to: Vec<f32>,
-    /// The time between, in frames; not 0. Negative where `to` lies before `from`.
-    pub time: f64,
-}
-
 /// The motion through the keys.
 ///
 /// # Errors
@@ -97,7 +62,14 @@ pub fn complete(keys: &Keys, options: &CompleteOptions, task: &Task) -> Result<W
     let poses = level_poses(keys, drift.as_ref());
     let mut warnings = Vec::new();
     task.phase("collapse", 0);
-    let ghost = Ghost::of(keys, &poses, &options.space, options.ghost.size)?.unpack(&mut warnings);
+    let torn = torn(keys.poses().topology().triangles(), &slices(&poses));
+    let ghost = Ghost::of(
+        keys,
+        &poses,
+        (options.space.as_str(), &torn[..]),
+        options.ghost.size,
+    )?
+    .unpack(&mut warnings);
     task.check()?;
     task.phase("encode", keys.count());
     let track = Track {
@@ -111,7 +83,7 @@ pub fn complete(keys: &Keys, options: &CompleteOptions, task: &Task) -> Result<W
     let topology = keys.poses().topology();
     let (space, (spline, large_turns)) = match &ghost {
         None => {
-            let space = open_space(topology, &options.space, &poses)?;
+            let space = open_space(topology, &options.space, &poses, &torn)?;
             let encode = |shape: &[f64], row: &mut [f64]| space.encode(shape, row);
             let through = track.through(&*space, &encode, &poses, task)?;
             (space, through)
@@ -127,8 +99,10 @@ pub fn complete(keys: &Keys, options: &CompleteOptions, task: &Task) -> Result<W
         space: space.name(),
         dimension: space.dimension(),
         large_turns,
+        torn: torn.iter().filter(|weight| **weight < 1.0).count(),
         ghost: ghost.map(|ghost| ghost.report(options.ghost)),
     };
+    warnings.extend(of_torn(&torn));
     warnings.extend(of_turns(large_turns));
     Ok(Warned {
         output: Motion::new(
@@ -142,28 +116,6 @@ pub fn complete(keys: &Keys, options: &CompleteOptions, task: &Task) -> Result<W
     })
 }
 
-/// The space of `topology` about the first of `poses`.
-fn open_space(
-    topology: &Arc<Topology>,
-    name: &str,
-    poses: &[Vec<f64>],
-) -> Result<Arc<dyn ShapeSpace>> {
-    let spaces = Spaces::new(Arc::clone(topology), &poses[0]);
-    let poses = slices(poses);
-    let weights = match name {
-        "patch-lri" => torn(topology.triangles(), &poses),
-        _ => Vec::new(),
-    };
-    Ok(match weights.is_empty() {
-        true => spaces.open(name, &poses)?,
-        false => spaces.open_weighted(&poses, &weights)?,
-    })
-}
-
-fn slices(poses: &[Vec<f64>]) -> Vec<&[f64]> {
-    poses.iter().map(Vec::as_slice).collect()
-}
-
 /// The keys' shapes, without the drift.
 fn level_poses(keys: &Keys, drift: Option<&Drift>) -> Vec<Vec<f64>> {
     let mut poses: Vec<Vec<f64>> = (0..keys.count()).map(|key| keys.pose(key)).collect();
@@ -173,155 +125,6 @@ fn level_poses(keys: &Keys, drift: Option<&Drift>) -> Vec<Vec<f64>> {
         }
     }
     poses
-}
-
-/// What a spline through keys is made of besides their shapes.
-struct Track<'a> {
-    keys: &'a Keys,
-    boundary: &'a Boundary,
-    controls: Controls<'a>,
-}
-
-/// Writes the coordinates of a shape of the mesh: its own, its ghost's, its mean.
-type Encode<'a> = &'a (dyn Fn(&[f64], &mut [f64]) + Sync);
-
-impl Track<'_> {
-    /// The space of a ghost and the spline through its coordinates. In `patch-lri` the ghost has the
-    /// patches of the mesh, turned as there: what rotations are taken relative to decides on the way
-    /// between keys.
-    fn behind(
-        &self,
-        ghost: &Ghost,
-        name: &str,
-        poses: &[Vec<f64>],
-        task: &Task,
-    ) -> Result<(Arc<dyn ShapeSpace>, (KeySpline, usize))> {
-        let ghosts: Vec<Vec<f64>> = poses.iter().map(|pose| ghost.pick(pose)).collect();
-        if name != "patch-lri" {
-            let space = open_space(&ghost.topology, name, &ghosts)?;
-            let encode = |shape: &[f64], row: &mut [f64]| space.encode(&ghost.pick(shape), row);
-            let through = self.through(&*space, &encode, poses, task)?;
-            return Ok((space, through));
-        }
-        let fine = Fine {
-            topology: self.keys.poses().topology(),
-            poses: &slices(poses),
-            weights: &ghost.torn_of_mesh,
-            carriers: &ghost.carriers(),
-        };
-        let spaces = Spaces::new(Arc::clone(&ghost.topology), &ghosts[0]);
-        let coarse = spaces.open_coarse(&fine, &ghost.torn)?;
-        let encode = |shape: &[f64], row: &mut [f64]| coarse.encode(shape, &ghost.pick(shape), row);
-        let through = self.through(&*coarse.space(), &encode, poses, task)?;
-        Ok((coarse.space(), through))
-    }
-
-    /// The spline through the coordinates in `space` of the shapes `poses` of the mesh, and how many
-    /// rotations turn far between keys.
-    fn through(
-        &self,
-        space: &dyn ShapeSpace,
-        encode: Encode<'_>,
-        poses: &[Vec<f64>],
-        task: &Task,
-    ) -> Result<(KeySpline, usize)> {
-        let d = space.dimension();
-        let mut rows = vec![0.0; poses.len() * d];
-        rows.par_chunks_mut(d.max(1))
-            .zip(poses)
-            .try_for_each(|(row, pose)| {
-                task.check()?;
-                encode(pose, row);
-                task.step();
-                Ok::<_, Box<Diagnostic>>(())
-            })?;
-        let turns = follow_frames(space, &mut rows);
-        let slope = |velocity: &Option<Velocity>, row: &[f64]| match velocity {
-            Some(velocity) => slope(velocity, space, encode, row),
-            None => Vec::new(),
-        };
-        let slopes = match self.boundary {
-            Boundary::Hermite { start, end } => [
-                slope(start, &rows[..d]),
-                slope(end, &rows[rows.len() - d..]),
-            ],
-            _ => Default::default(),
-        };
-        let ends = match self.boundary {
-            Boundary::Natural => Ends::Natural,
-            Boundary::Periodic { .. } => Ends::Periodic,
-            Boundary::Hermite { .. } => Ends::Clamped {
-                first: &slopes[0],
-                last: &slopes[1],
-            },
-        };
-        Ok((self.spline(&rows, d, ends)?, turns))
-    }
-
-    fn spline(&self, rows: &[f64], width: usize, ends: Ends<'_>) -> Result<KeySpline> {
-        let spline = KeySpline::new(self.keys.times(), rows, width, ends, self.controls);
-        Ok(spline.map_err(|_| Diagnostic::error("the keys' coordinates are not finite"))?)
-    }
-
-    /// The mesh behind its ghost.
-    fn follow(
-        &self,
-        ghost: &Ghost,
-        poses: &[Vec<f64>],
-        options: GhostOptions,
-        task: &Task,
-    ) -> Result<Following> {
-        task.phase("follow", 0);
-        let point = Arc::new(Topology::points(1));
-        let space = Spaces::new(point, &middle(&poses[0])).open("vertices", &[])?;
-        let encode = |shape: &[f64], row: &mut [f64]| row.copy_from_slice(&middle(shape));
-        let (mean, _) = self.through(&*space, &encode, poses, &Task::default())?;
-        let weights = options.residual.then(|| self.cardinal()).transpose()?;
-        let topology = self.keys.poses().topology();
-        Following::new(ghost, topology, poses, options.lift, weights, mean)
-    }
-
-    /// The weight of each key by time: splines through 1 at one key and 0 at the others. The last key of
-    /// a period is the first.
-    fn cardinal(&self) -> Result<KeySpline> {
-        let n = self.keys.count();
-        let periodic = matches!(self.boundary, Boundary::Periodic { .. });
-        let mut rows = vec![0.0; n * n];
-        for key in 0..n {
-            let weight = if periodic && key + 1 == n { 0 } else { key };
-            rows[key * n + weight] = 1.0;
-        }
-        let ends = if periodic {
-            Ends::Periodic
-        } else {
-            Ends::Natural
-        };
-        self.spline(&rows, n, ends)
-    }
-}
-
-/// The mean vertex.
-fn middle(pose: &[f64]) -> [f64; 3] {
-    mean(pose).into()
-}
-
-/// A velocity at a key in the space whose coordinates `encode` finds; `row` are the key's.
-fn slope(velocity: &Velocity, space: &dyn ShapeSpace, encode: Encode<'_>, row: &[f64]) -> Vec<f64> {
-    let encoded = |shape: &[f32], near: &[f64]| {
-        let mut coordinates = vec![0.0; row.len()];
-        encode(&widened(shape), &mut coordinates);
-        space.follow(near, &mut coordinates);
-        coordinates
-    };
-    let from = match &velocity.from {
-        Some(shape) => encoded(shape, row),
-        None => row.to_vec(),
-    };
-    let mut slope = encoded(&velocity.to, &from);
-    for (slope, from) in slope.iter_mut().zip(&from) {
-        *slope = (*slope - from) / velocity.time;
-    }
-    slope
 }
 
 /// One handle a key.
@@ -356,132 +159,19 @@ fn check_overshoot(share: Option<f64>) -> Result<()> {
     }
 }
 
-/// How far, in sizes of the mesh, two shapes may differ that are one: files keep six digits.
-const SAME: f64 = 1e-5;
-
-/// The rigid motion to be split off, if any; the first and the last key of a period agree.
-fn drift(keys: &Keys, boundary: &Boundary) -> Result<Option<Drift>> {
-    let Boundary::Periodic { drift } = boundary else {
-        return Ok(None);
-    };
-    let last = keys.count() - 1;
-    let (first, end) = (keys.pose(0), keys.pose(last));
-    let size = Bounds::of(keys.poses().frame(0)).map_or(0.0, |bounds| {
-        let along = |axis: usize| f64::from(bounds.max[axis] - bounds.min[axis]);
-        (0..3).map(along).fold(0.0, f64::max)
-    });
-    let near = |shape: &[f64], share: f64| {
-        let pairs = shape.iter().zip(&end);
-        pairs
-            .into_iter()
-            .all(|(a, b)| (a - b).abs() <= share * size)
-    };
-    let motion = rigid(&first, &end);
-    let moved: Vec<f64> = first
-        .chunks_exact(3)
-        .flat_map(|point| {
-            let point = nalgebra::Point3::from_slice(point);
-            (motion * point).coords.data.0[0]
-        })
-        .collect();
-    // a rigid fit to rounded files is a little less exact
-    let rigidly = near(&moved, 10.0 * SAME);
-    if *drift && rigidly {
-        return Ok(Some(Drift::between(&first, &end, keys.ends())));
-    }
-    if near(&first, SAME) {
-        return Ok(None);
-    }
-    let told = Diagnostic::error(format!(
-        "the last key ({}) differs from the first: a period ends where it began",
-        last + 1
-    ));
-    match rigidly {
-        true => told.hint(
-            "it is the first key, moved: `--drift rigid` (drift: \"rigid\") splits the motion off",
-        ),
-        false => told.hint("repeat the first key as the last"),
-    }
-    .err()
-}
-
-fn check_velocities(keys: &Keys, boundary: &Boundary) -> Result<()> {
-    let Boundary::Hermite { start, end } = boundary else {
-        return Ok(());
-    };
-    let vertices = keys.poses().topology().vertices();
-    for (velocity, name, key) in [(start, "start", "first"), (end, "end", "last")] {
-        let Some(velocity) = velocity else {
-            return Diagnostic::error(format!("Hermite ends without a velocity at the {key} key"))
-                .hint(format!(
-                    "`--{name}-velocity POSE` or `--velocities-from SEQUENCE` gives it ({name}_velocity, \
-                     velocities_from in recipes)"
-                ))
-                .err();
-        };
-        for shape in velocity.from.iter().chain([&velocity.to]) {
-            if shape.len() != 3 * vertices {
-                return Diagnostic::error(format!(
-                    "a shape of {} vertices gives no velocity to keys of {vertices}",
-                    shape.len() / 3
-                ))
-                .hint("velocities are differences of shapes of the keys' mesh")
-                .err();
-            }
-        }
-    }
-    Ok(())
-}
-
-impl Velocity {
-    /// The velocity at an end of a motion, from its frames (X26): of the first two, or of the last two,
-    /// for frames spread evenly over `time`.
-    ///
-    /// # Errors
-    /// Fewer than two frames, or another mesh than `topology`.
-    pub fn at_end(
-        frames: &crate::mesh::Sequence,
-        topology: &Topology,
-        last: bool,
-        time: f64,
-    ) -> Result<Self> {
-        same_faces(topology, frames.topology(), 1)?;
-        let n = frames.frames();
-        if n < 2 {
-            return Diagnostic::error("one frame has no velocity")
-                .hint("name a sequence of two or more frames")
-                .err();
-        }
-        let from = if last { n - 2 } else { 0 };
-        Ok(Velocity {
-            from: Some(frames.frame(from).to_vec()),
-            to: frames.frame(from + 1).to_vec(),
-            time: time / (n - 1) as f64,
-        })
-    }
-
-    /// The velocity that one pose (from the key towards it) or two (from the first to the second) give,
-    /// in a time of [`super::SPACING`] frames.
-    ///
-    /// # Errors
-    /// No pose or more than two, or another mesh than `topology`.
-    pub fn of_poses(poses: &crate::mesh::Sequence, topology: &Topology) -> Result<Self> {
-        same_faces(topology, poses.topology(), 1)?;
-        let (from, to) = match poses.frames() {
-            1 => (None, 0),
-            2 => (Some(poses.frame(0).to_vec()), 1),
-            n => {
-                return Diagnostic::error(format!("{n} poses give no velocity"))
-                    .hint("one is what the key moves towards, two are left and reached")
-                    .err();
-            }
-        };
-        Ok(Velocity {
-            from,
-            to: poses.frame(to).to_vec(),
-            time: super::SPACING,
-        })
-    }
+/// Where keys' vertices do not correspond, nothing between can be right: the first such place is told.
+fn of_torn(weights: &[f64]) -> Option<Diagnostic> {
+    let torn = || weights.iter().filter(|weight| **weight < 1.0).count();
+    let first = weights.iter().position(|weight| *weight < 1.0)?;
+    Some(
+        Diagnostic::warning(format!(
+            "{} triangles are torn between keys, such as triangle {}: their longest side changes more than \
+             tenfold beside the others'",
+            torn(),
+            first + 1
+        ))
+        .hint("do the vertices of all keys correspond there? Torn triangles hardly bend the rest"),
+    )
 }
 
 fn of_turns(turns: usize) -> Option<Diagnostic> {

@@ -22,6 +22,8 @@ pub struct MotionReport {
     pub dimension: usize,
     /// Rotations that turn by more than 150 degrees from one key to the next.
     pub large_turns: usize,
+    /// Triangles that are torn between keys ([`crate::mesh::torn`]).
+    pub torn: usize,
     /// The ghost that the splines run on, if they do.
     pub ghost: Option<GhostReport>,
 }
@@ -130,6 +132,19 @@ impl Motion {
         positions
     }
 
+    /// The ghost at time `t`: its connectivity and 3G positions. None for a motion without one.
+    pub fn ghost_at(&self, t: f64) -> Option<(Arc<Topology>, Vec<f64>)> {
+        let ghost = self.following.as_ref()?.ghost();
+        let mut coordinates = vec![0.0; self.spline.width()];
+        self.spline.evaluate(t, &mut coordinates);
+        let mut positions = vec![0.0; 3 * ghost.vertices()];
+        self.space.decode(&coordinates, &mut positions);
+        if let Some(drift) = &self.drift {
+            drift.apply(t, &mut positions);
+        }
+        Some((Arc::clone(ghost), positions))
+    }
+
     fn evaluate_in(&self, t: f64, scratch: &mut Scratch, positions: &mut [f64]) {
         let Scratch {
             coordinates, ghost, ..
@@ -139,7 +154,7 @@ impl Motion {
         match &self.following {
             None => self.space.decode(coordinates, positions),
             Some(following) => {
-                ghost.resize(following.ghost_width(), 0.0);
+                ghost.resize(3 * following.ghost().vertices(), 0.0);
                 self.space.decode(coordinates, ghost);
                 following.place(t, ghost, positions);
             }

@@ -179,6 +179,10 @@ fn a_torn_border_leaves_the_rest_of_the_motion_alone() {
         };
         let [whole, torn] = [0, 1].map(|of| motion(&keys[of], &options));
         reproduces(&keys[1], &torn, "torn");
+        assert_eq!(
+            [&whole, &torn].map(|motion| motion.report().torn),
+            [0, 2 * AROUND]
+        );
         for t in [7.0, 13.0, 19.0, 31.0, 40.0] {
             // the mean vertex goes with the border
             let [whole, torn] = [&whole, &torn].map(|motion| motion.at(t)[..end.start].to_vec());

@@ -122,11 +122,12 @@ pub(super) struct Ghost {
 }
 
 impl Ghost {
-    /// The ghost for some keys, whose shapes are `poses`; none where none is wanted or needed.
+    /// The ghost for some keys, whose shapes are `poses` and whose triangles count by `torn`; none where
+    /// none is wanted or needed.
     pub(super) fn of(
         keys: &Keys,
         poses: &[Vec<f64>],
-        space: &str,
+        (space, torn): (&str, &[f64]),
         size: GhostSize,
     ) -> Result<Warned<Option<Self>>> {
         let triangles = keys.poses().topology().triangles();
@@ -149,12 +150,17 @@ impl Ghost {
                 warnings: vec![without(error)],
             }),
             Ok(found) => {
-                Ghost::made(found, triangles, &all).map(|ghost| Warned::clean(Some(ghost)))
+                Ghost::made(found, triangles, &all, torn).map(|ghost| Warned::clean(Some(ghost)))
             }
         }
     }
 
-    fn made(found: Collapsed, triangles: &[[u32; 3]], poses: &[&[f64]]) -> Result<Self> {
+    fn made(
+        found: Collapsed,
+        triangles: &[[u32; 3]],
+        poses: &[&[f64]],
+        torn_of_mesh: &[f64],
+    ) -> Result<Self> {
         let topology = Topology::from_triangles(found.vertices.len(), &found.triangles);
         let topology =
             topology.map_err(|error| Diagnostic::error(format!("the ghost: {error}")))?;
@@ -167,7 +173,7 @@ impl Ghost {
         Ok(Ghost {
             faces: walk.to_faces(triangles, poses[0], &found.absorber),
             torn: torn(&found.triangles, &shapes),
-            torn_of_mesh: torn(triangles, poses),
+            torn_of_mesh: torn_of_mesh.to_vec(),
             topology: Arc::new(topology),
             vertices: found.vertices,
             absorber: found.absorber,
@@ -269,7 +275,7 @@ pub(super) struct Following {
     weights: Option<KeySpline>,
     /// The mean vertex of the mesh by time.
     mean: KeySpline,
-    vertices: usize,
+    topology: Arc<Topology>,
 }
 
 impl Following {
@@ -310,7 +316,7 @@ impl Following {
             turns: Arc::new(turns),
             weights,
             mean,
-            vertices: ghost.vertices.len(),
+            topology: Arc::clone(&ghost.topology),
         })
     }
 
@@ -326,13 +332,13 @@ impl Following {
             gradients: self.gradients.clone(),
             weights,
             mean: self.mean.again(times, controls)?,
-            vertices: self.vertices,
+            topology: Arc::clone(&self.topology),
         })
     }
 
-    /// How many coordinates the ghost has.
-    pub(super) fn ghost_width(&self) -> usize {
-        3 * self.vertices
+    /// The ghost's connectivity.
+    pub(super) fn ghost(&self) -> &Arc<Topology> {
+        &self.topology
     }
 
     /// Writes the 3V positions of the mesh for the ghost's positions at time `t`.
