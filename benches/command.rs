@@ -18,7 +18,7 @@ const RUNS: usize = 5;
 fn main() {
     let folder = tempfile::tempdir().expect("a folder for the frames");
     let demo = Demo::find("gallop").expect("a built-in capture");
-    let capture = (demo.generate)();
+    let capture = demo.generate();
     let frames = folder.path().join("frames");
     let written = save(
         &Disk,

@@ -180,7 +180,8 @@ fn interruptions() {
     );
     let transfer = format!("{pairs}a.transfer(examples(t, s))");
     for (name, before, text) in [
-        ("fit", jelly, &fit),
+        ("demo", "1", jelly),
+        ("fit", jelly, fit.as_str()),
         ("sample", bar, &sample),
         ("transfer", &pairs, &transfer),
     ] {

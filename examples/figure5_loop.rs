@@ -6,8 +6,8 @@ mod support;
 
 use std::process::ExitCode;
 
-use meshloom::diag::{Diagnostic, Result};
-use meshloom::edit::{Looped, add_loop};
+use meshloom::diag::Result;
+use meshloom::edit::{Looped, find_loop};
 use meshloom::loom::Loom;
 use meshloom::loom::fit::FitOptions;
 use meshloom::mesh::FrameSource;
@@ -18,9 +18,6 @@ use support::{Figure, View, percent, table};
 
 /// How many frames the loop may have: about as many as the paper's adds.
 const LENGTHS: std::ops::RangeInclusive<usize> = 12..=30;
-
-/// How many loops are tried.
-const CANDIDATES: usize = 16;
 
 /// Frames of the new loop that are shown.
 const SHOWN: usize = 7;
@@ -40,9 +37,9 @@ fn draw(figure: &mut Figure) -> Result<()> {
         scaled(19).min(n - 1),
     ];
     let loom = support::fit_with(&sequence, counts, FitOptions::default())?;
-    let (start, length) = best_loop(&loom)?;
-    let (from, to) = (start as f64, (start + length) as f64);
-    let looped = add_loop(&loom, from, to, 1, None)?;
+    let looped = find_loop(&loom, *LENGTHS.start(), *LENGTHS.end())?;
+    let (from, to) = looped.stretch;
+    let length = (to - from) as usize;
     let longer = &looped.loom;
     let added = longer.frames() - n;
     let same = untouched(&loom, longer, looped.stretch)?;
@@ -104,42 +101,6 @@ fn draw(figure: &mut Figure) -> Result<()> {
     // at each seam, two spans to either side: fewer than four frames at 0.8 spans a frame
     figure.goal("all but eight frames keep their bits", same + 8 >= n);
     figure.picture(&compose(&loom, &looped, &view)?)
-}
-
-/// The frame from which on, and the number of frames after which, the motion comes back to where it was:
-/// of those with the nearest place and direction the one whose seam shows least.
-fn best_loop(loom: &Loom) -> Result<(usize, usize)> {
-    let n = loom.frames();
-    let state = |frame: usize| -> Result<(Vec<f64>, Vec<f64>)> {
-        let (t, h) = (frame as f64, 0.25);
-        let (before, after) = (loom.coordinates_at(t - h)?, loom.coordinates_at(t + h)?);
-        let speed = before.iter().zip(&after).map(|(a, b)| (b - a) / (2.0 * h));
-        Ok((loom.coordinates_at(t)?, speed.collect()))
-    };
-    let states = (2..n).map(state).collect::<Result<Vec<_>>>()?;
-    let apart = |a: &[f64], b: &[f64]| {
-        let squares = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b));
-        squares.sum::<f64>()
-    };
-    let mut loops = Vec::new();
-    for length in LENGTHS {
-        for start in 6..n.saturating_sub(length + 6) {
-            let ((x, v), (y, w)) = (&states[start - 2], &states[start + length - 2]);
-            loops.push((apart(x, y) + apart(v, w), (start, length)));
-        }
-    }
-    loops.sort_by(|a, b| a.0.total_cmp(&b.0));
-    loops.truncate(CANDIDATES);
-    let mut best = (f64::INFINITY, None);
-    for (_, (start, length)) in loops {
-        let (from, to) = (start as f64, (start + length) as f64);
-        let seam = add_loop(loom, from, to, 1, None)?.seam.worst();
-        if seam < best.0 {
-            best = (seam, Some((start, length)));
-        }
-    }
-    let few = || Diagnostic::error(format!("{n} frames are too few for a loop"));
-    best.1.ok_or_else(|| few().into())
 }
 
 /// How many frames have the same bits before and after: those before the loop's end at their own times,

@@ -34,7 +34,7 @@ fn main() -> ExitCode {
     support::run("transitions", |figure| {
         let captures: Vec<(String, Sequence, bool)> = if figure.is_demo() {
             let motions = DEMOS.iter().filter(|demo| demo.kind == Kind::Motion);
-            let made = motions.map(|demo| (demo.name.to_string(), (demo.generate)(), demo.travels));
+            let made = motions.map(|demo| (demo.name.to_string(), demo.generate(), demo.travels));
             made.collect()
         } else {
             vec![("capture".to_string(), figure.capture("")?.0, false)]

@@ -141,6 +141,15 @@ impl Diagnostic {
         self
     }
 
+    /// What stands under the shown line: a caret below the column, after as many spaces; tabs stay tabs,
+    /// so that it stands under its letter at any tab width. None where no line or no column is known.
+    pub fn caret(&self) -> Option<String> {
+        let (line, column) = self.excerpt.as_ref().zip(self.place.column)?;
+        let before = line.chars().take(column.saturating_sub(1));
+        let indent: String = before.map(|c| if c == '\t' { c } else { ' ' }).collect();
+        Some(indent + "^")
+    }
+
     /// This diagnostic as the error of a [`Result`].
     pub fn err<T>(self) -> Result<T> {
         Err(Box::new(self))
@@ -191,14 +200,8 @@ impl fmt::Display for Diagnostic {
         f.write_str(&self.message)?;
         if let Some(line) = &self.excerpt {
             write!(f, "\n  | {line}")?;
-            if let Some(column) = self.place.column {
-                // Tabs stay tabs, so that the caret stands under its letter at any tab width.
-                let indent: String = line
-                    .chars()
-                    .take(column.saturating_sub(1))
-                    .map(|c| if c == '\t' { c } else { ' ' })
-                    .collect();
-                write!(f, "\n  | {indent}^")?;
+            if let Some(caret) = self.caret() {
+                write!(f, "\n  | {caret}")?;
             }
         }
         self.hints

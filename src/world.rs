@@ -13,6 +13,14 @@ use std::time::Duration;
 
 use crate::diag::{Diagnostic, Result};
 
+/// The folder that a file is in, by its name: "." for a bare name.
+pub fn folder_of(file: &Path) -> &Path {
+    match file.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    }
+}
+
 /// Files as the library sees them. All errors name the path.
 pub trait World: Send + Sync {
     /// Replaces `bytes` by the whole content of a file; its allocation is used again.
@@ -61,6 +69,11 @@ pub trait World: Send + Sync {
         let mut bytes = Vec::new();
         self.read_into(path, &mut bytes)?;
         Ok(bytes)
+    }
+
+    /// How many bytes of memory this process takes, where the system tells.
+    fn memory_in_use(&self) -> Option<usize> {
+        None
     }
 }
 

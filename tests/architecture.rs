@@ -21,7 +21,7 @@ const MAP: &[(&str, &str)] = &[
     ("metric", "task math mesh"),
     ("edit", "diag task math mesh space signal loom"),
     ("sample", "diag task mesh loom"),
-    ("demo", "math mesh"),
+    ("demo", "task math mesh"),
     ("format", "diag math mesh loom"),
     ("plot", "image math mesh"),
     ("view", "image math mesh"),

@@ -98,7 +98,7 @@ fn a_mesh_and_its_reference_pose_are_factored_once() {
     let (_, factors) = made(|| loom_of(&capture, "gradients"));
     assert_eq!(factors, 1);
     // a recipe's fits that differ in what they keep, its edits and frames
-    let bar = (Demo::find("bar").unwrap().generate)();
+    let bar = Demo::find("bar").unwrap().generate();
     let held = loom_of(&bar, "gradients");
     let (_, factors) = made(recipe);
     assert_eq!(factors, 0, "a recipe beside a loom of the same capture");

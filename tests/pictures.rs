@@ -134,7 +134,7 @@ impl Terminal {
 /// A folder with the first frames of the built-in horse as `horse.loom`.
 fn folder() -> TempDir {
     let horse = Demo::find("gallop").expect("there is a horse");
-    let whole = (horse.generate)();
+    let whole = horse.generate();
     let frames = whole.frames().min(24);
     let options = FitOptions {
         left_out: false,

@@ -1,35 +1,13 @@
-//! Recipes through the real binary: what they do, what they refuse and how they say it.
+//! Recipes through the real binary: what they do.
 
 mod support;
 
 use std::fs;
-use std::path::Path;
 
 use serde_json::Value;
 use support::capture::sheet;
-use support::{Run, command, everything, run};
-use tempfile::{TempDir, tempdir};
-
-/// A folder with a capture `sheet` of 12 frames, a loom of it, and a recipe.
-fn kitchen(recipe: &str) -> TempDir {
-    let folder = tempdir().unwrap();
-    sheet(5, 12).write_objs(&folder.path().join("sheet"));
-    fs::write(folder.path().join("r.rhai"), recipe).unwrap();
-    folder
-}
-
-/// Runs the binary with a cache folder of the test's own.
-fn meshloom(folder: &Path, args: &str) -> Run {
-    let mut command = command(folder, args.split_whitespace());
-    command.env("MESHLOOM_CACHE", folder.join(".cache"));
-    run(command)
-}
-
-/// Runs the recipe on the sheet.
-fn outcome(recipe: &str, args: &str) -> Run {
-    let folder = kitchen(recipe);
-    meshloom(folder.path(), &format!("run r.rhai sheet --json {args}"))
-}
+use support::kitchen::{kitchen, meshloom, outcome};
+use support::{command, everything};
 
 #[test]
 fn the_last_value_is_written_by_the_ending_of_out() {
@@ -204,39 +182,6 @@ fn modules_stay_inside_of_the_folder() {
 }
 
 #[test]
-fn errors_name_line_column_and_show_the_line() {
-    let run = outcome(
-        "let a = fit(input(), #{ tolerance: 0.05 });\n  a.add_lop(1, 5)",
-        "",
-    );
-    run.fails_with(&[
-        "r.rhai:2:",
-        "no function `add_lop` for Loom",
-        "  |   a.add_lop(1, 5)",
-        "^",
-        "did you mean `add_loop`?",
-    ]);
-    let object = run.object();
-    assert_eq!(
-        (&object["error"]["line"], &object["error"]["severity"]),
-        (&Value::from(2), &Value::from("error"))
-    );
-    outcome("fit(input(), #{ tolerance: 0.05 }).add_loop(\"a\")", "")
-        .fails_with(&["`add_loop` does not take", "`loom.add_loop(a, b)`"]);
-    outcome("fit(input(), #{ tolernce: 0.05 })", "")
-        .fails_with(&["no option `tolernce`", "did you mean `tolerance`?"]);
-    outcome("let = 3", "").fails_with_any(&["r.rhai:1:", "  | let = 3"]);
-    outcome("fit(input(), #{ tolerance: 0.05 }).trim(3, 99)", "")
-        .fails_with_any(&["r.rhai:1:", "99"]);
-    outcome("fit(input(), #{ tolerance: 0.05 }).speed(2, 5, -1)", "")
-        .fails_with_any(&["r.rhai:1:", "-1"]);
-    outcome("fit(input(), #{ tolerance: 0.05 }).add_loop(8, 3)", "")
-        .fails_with_any(&["r.rhai:1:", "8"]);
-    outcome("check(1 > 2, \"one is not more\")", "")
-        .fails_with_any(&["check failed: one is not more"]);
-}
-
-#[test]
 fn a_check_resolves_without_running() {
     let folder = kitchen("fit(inptu())\n// never_called()\n");
     meshloom(folder.path(), "run r.rhai --check").fails_with(&[
@@ -253,120 +198,6 @@ fn a_check_resolves_without_running() {
 }
 
 #[test]
-fn nothing_is_written_when_the_recipe_fails_after_a_save() {
-    let folder = kitchen("save(input(), \"copy/f_##.obj\");\ncheck(false, \"no\")");
-    fs::create_dir(folder.path().join("out")).unwrap();
-    assert_eq!(
-        meshloom(folder.path(), "run r.rhai sheet -o out").code,
-        Some(1)
-    );
-    assert_eq!(everything(&folder.path().join("out")), []);
-}
-
-#[test]
-fn a_recipe_reads_and_writes_only_where_it_may() {
-    outcome("save(input(), \"../evil.obj\")", "-o out")
-        .fails_with(&["outside of the output folder"]);
-    outcome("save(input(), \"/tmp/meshloom-evil.obj\")", "-o out")
-        .fails_with(&["outside of the output folder"]);
-    outcome("open(\"/etc\")", "")
-        .fails_with(&["outside of what this recipe may read", "--allow-read"]);
-    outcome("save(input(), \"a.obj\")", "").fails_with(&["nowhere to write", "-o"]);
-}
-
-#[test]
-fn endless_and_greedy_recipes_end() {
-    for (recipe, message) in [
-        ("loop { }", "too many steps"),
-        ("fn f(n) { f(n + 1) } f(0)", "too deeply"),
-        ("let s = \"x\"; for i in 0..40 { s += s; } s", "too large"),
-        (
-            "let a = []; for i in 0..1000000 { a.push(i); } a",
-            "too large",
-        ),
-        ("let a = []; a.pad(1000000000, 0); a", "too large"),
-        ("1 / 0", "division by zero"),
-    ] {
-        let run = outcome(recipe, "");
-        assert_eq!(run.code, Some(1), "{recipe}");
-        assert!(
-            run.stderr.to_lowercase().contains(message),
-            "{recipe}: {}",
-            run.stderr
-        );
-    }
-    outcome("sleep(1)", "").fails_with(&["`sleep` is not for recipes"]);
-    outcome("eval(\"1\")", "").fails_with_any(&["r.rhai:1:"]);
-    outcome(
-        "while true { fit(input(), #{ tolerance: 0.05 }).at(1.5); }",
-        "--time-limit 0.5",
-    )
-    .fails_with(&["longer than 0.5 s", "--time-limit"]);
-}
-
-#[test]
-fn native_results_have_a_limit_of_their_own() {
-    outcome(
-        "let loom = fit(demo(\"bar\"), #{ tolerance: 0.05 });\nloom.resample(frames(1000000))",
-        "",
-    )
-    .fails_with(&["r.rhai:2:", "more than 8 GiB", "sample fewer frames"]);
-}
-
-#[test]
-fn times_outside_of_a_loom_are_refused_with_its_range() {
-    for edit in [
-        "add_loop(0.5, 5)",
-        "add_loop(3, 99)",
-        "add_loop(5, 5)",
-        "at(12.5)",
-        "hold(0, 3)",
-    ] {
-        let recipe = format!("let a = fit(input(), #{{ tolerance: 0.05 }});\na.{edit}");
-        outcome(&recipe, "").fails_with_any(&["r.rhai:2:"]);
-    }
-    outcome("fit(input(), #{ tolerance: 0.05 }).add_loop(3, 99)", "").fails_with(&["[1, 12]"]);
-}
-
-#[test]
-fn examples_that_do_not_fit_are_refused() {
-    let loom = "let a = fit(input(), #{ tolerance: 0.05 });\n";
-    let with = |rest: &str| outcome(&format!("{loom}{rest}"), "");
-    with("a.transfer(examples([a.at(1), a.at(4)], [a.at(1)]))")
-        .fails_with(&["r.rhai:2:", "2 source examples and 1 target examples"]);
-    with("a.transfer(examples([a.at(1), a.at(1)], [a.at(1), a.at(4)]))")
-        .fails_with_any(&["all source examples are the reference pose"]);
-    with("a.transfer(examples(demo(\"cactus\"), demo(\"cactus\")))")
-        .fails_with(&["other faces than the loom"]);
-    with("a.transfer(examples([a.at(1), 3], [a.at(1), a.at(4)]))")
-        .fails_with_any(&["item 2 of the array"]);
-    // two examples of a motion with more modes: what they do not span is told
-    let told = with("a.transfer(examples([a.at(1), a.at(6)], [a.at(1), a.at(6)]))").done();
-    assert!(
-        told.stderr.contains("outside of what the examples span"),
-        "{}",
-        told.stderr
-    );
-}
-
-#[test]
-fn maps_from_scratch_say_what_is_wrong_with_them() {
-    let poses = "let c = demo(\"cactus\");\n";
-    let with = |rest: &str| outcome(&format!("{poses}{rest}"), "");
-    with("pose_map([[c.frame(1), [0, 0]], [c.frame(2), [0, 0]]])")
-        .fails_with(&["r.rhai:2:", "poses 1 and 2 have the same place"]);
-    with("pose_map([[c.frame(1), [0]]])").fails_with_any(&["must be [x, y]"]);
-    with("pose_map([c.frame(1)])").fails_with_any(&["a pose [mesh, [x, y]]"]);
-    with("pose_map([])").fails_with_any(&["r.rhai:2:"]);
-    with("pose_map([[c.frame(1), [0, 0]], [demo(\"bar\").frame(1), [1, 0]]])")
-        .fails_with_any(&["shape 2 has"]);
-    with("pose_map([[c.frame(1), [0, 0]]]).add_pose(demo(\"bar\").frame(1))")
-        .fails_with(&["the mesh has other faces than the loom"]);
-    with("pose_map([[c.frame(1), [0, 0]], [c.frame(2), [1, 0]]]).path([[0, 0]], #{ curve: \"round\" })")
-        .fails_with(&["no curve `round`", "controls"]);
-}
-
-#[test]
 fn a_transfer_keeps_the_loops_made_before_it() {
     let recipe = "
         let a = fit(input(), #{ controls: 10, sites: 9, modes: 3 });
@@ -379,34 +210,6 @@ fn a_transfer_keeps_the_loops_made_before_it() {
         let after = a.transfer(pairs).add_loop(4, 8, #{ times: 2, bridge: 2 });
         check(after.frames == there.frames, \"either way round\");";
     outcome(recipe, "").done();
-}
-
-#[test]
-fn a_disk_that_fills_up_keeps_earlier_outputs() {
-    let folder = kitchen("save(input(), \"copy/f_##.obj\");\nfit(input(), #{ tolerance: 0.05 })");
-    meshloom(folder.path(), "run r.rhai sheet -o out").done();
-    let before = everything(&folder.path().join("out"));
-    sheet(40, 3).write_objs(&folder.path().join("big"));
-    let binary = env!("CARGO_BIN_EXE_meshloom");
-    let mut shell = std::process::Command::new("sh");
-    // files may not grow beyond a block: the disk is as good as full
-    let line = format!("trap '' XFSZ; ulimit -f 8; exec '{binary}' run r.rhai big -o out");
-    shell.current_dir(folder.path()).args(["-c", &line]);
-    shell.env("MESHLOOM_CACHE", folder.path().join(".cache"));
-    run(shell).fails_with_any(&["out"]);
-    assert_eq!(everything(&folder.path().join("out")), before);
-}
-
-#[test]
-fn what_is_no_recipe_is_refused() {
-    let folder = kitchen("");
-    meshloom(folder.path(), "run r.rhai").fails_with(&["the recipe is empty"]);
-    fs::write(folder.path().join("r.rhai"), b"let a = 1;\n\xff\xfe").unwrap();
-    meshloom(folder.path(), "run r.rhai").fails_with(&["not UTF-8", "r.rhai:2"]);
-    fs::create_dir(folder.path().join("d.rhai")).unwrap();
-    assert_eq!(meshloom(folder.path(), "run d.rhai").code, Some(1));
-    meshloom(folder.path(), "run lop").fails_with(&["no such recipe", "loop"]);
-    meshloom(folder.path(), "run loop").fails_with(&["`input()` needs an input"]);
 }
 
 #[test]
@@ -479,4 +282,30 @@ fn a_live_run_follows_the_recipe() {
     fs::write(folder.path().join("r.rhai"), "`five`").unwrap();
     assert_eq!(live.next().and_then(report).as_deref(), Some("five"));
     assert!(!live.ended());
+}
+
+#[test]
+fn a_live_run_follows_what_the_recipe_reads() {
+    let folder =
+        kitchen("import \"m\" as m;\nlet f = open(\"takes\").frames;\n`${m::name()} ${f}`");
+    fs::write(folder.path().join("m.rhai"), "fn name() { \"a\" }").unwrap();
+    let mut command = command(folder.path(), "run r.rhai --live --json".split(' '));
+    command.env("MESHLOOM_CACHE", folder.path().join(".cache"));
+    let mut live = support::Lines::of(command);
+    let failed = live.next().map(|line| line["error"]["severity"].clone());
+    assert_eq!(failed, Some("error".into()));
+    // what was missing appears, whole
+    sheet(3, 4).write_objs(&folder.path().join("beside"));
+    fs::rename(folder.path().join("beside"), folder.path().join("takes")).unwrap();
+    let mut next = |wanted: &str| {
+        // a folder may be seen while it is filled
+        let line = live.find(|line| line["report"] == wanted);
+        assert!(line.is_some(), "{wanted}");
+    };
+    next("a 4");
+    let frame = |number: usize| folder.path().join(format!("takes/frame_{number:04}.obj"));
+    fs::copy(frame(1), frame(5)).unwrap();
+    next("a 5");
+    fs::write(folder.path().join("m.rhai"), "fn name() { \"b\" }").unwrap();
+    next("b 5");
 }

@@ -25,7 +25,7 @@ fn every_function_is_described_with_forms_and_an_example() {
 #[test]
 fn every_example_runs() {
     let folder = tempfile::tempdir().unwrap();
-    let bar = (meshloom::demo::Demo::find("bar").unwrap().generate)();
+    let bar = meshloom::demo::Demo::find("bar").unwrap().generate();
     let task = Task::default();
     save(
         &Disk,

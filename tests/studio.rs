@@ -144,7 +144,7 @@ fn cells(count: u16) -> NonZero<u16> {
 
 fn capture() -> Sequence {
     let bar = Demo::find("bar").expect("there is a bar");
-    let whole = (bar.generate)();
+    let whole = bar.generate();
     let frames = whole.frames().min(12);
     whole.slice(0..frames)
 }
@@ -607,7 +607,7 @@ fn what_was_in_hand_when_the_connection_was_lost_is_offered_again() {
 /// A folder with three poses of a bar, far from each other, and a recipe.
 fn poses(recipe: &str) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
-    let bar = (Demo::find("bar").expect("there is a bar").generate)();
+    let bar = Demo::find("bar").expect("there is a bar").generate();
     let some = [0, 30, 55].map(|frame| bar.frame(frame % bar.frames()).to_vec());
     let keys = Sequence::new(Arc::clone(bar.topology()), some.concat(), None);
     std::fs::create_dir(folder.path().join("keys")).unwrap();

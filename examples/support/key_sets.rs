@@ -8,7 +8,7 @@ use meshloom::mesh::{FrameSource, Sequence, subdivide};
 /// Frames `chosen` (from 0) of a demo, subdivided `times` times.
 pub(crate) fn demo_keys(name: &str, chosen: &[usize], times: usize) -> Keys {
     let demo = Demo::find(name).expect("a demo of that name");
-    let all = (demo.generate)();
+    let all = demo.generate();
     let positions = chosen.iter().flat_map(|&frame| all.frame(frame).to_vec());
     let few = Sequence::new(all.topology().clone(), positions.collect(), None);
     let fine = (0..times).fold(few, |keys, _| subdivide(&keys));

@@ -83,7 +83,7 @@ impl Figure {
     pub(crate) fn capture(&self, demo: &str) -> Result<(Sequence, View)> {
         let (sequence, direction) = match (&self.capture, Demo::find(demo)) {
             (Some(path), _) => (open(path)?, [0.6, 0.25]),
-            (None, Some(demo)) => ((demo.generate)(), demo.view),
+            (None, Some(demo)) => (demo.generate(), demo.view),
             (None, None) => return Diagnostic::error(format!("no demo `{demo}`")).err(),
         };
         let view = View::looking(&sequence, direction);

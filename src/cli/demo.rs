@@ -55,7 +55,7 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<Outcome> {
     }
     let folder = args.write.as_deref().unwrap_or(Path::new(FOLDER));
     session.task.phase("load", 0);
-    let capture = (demo.generate)();
+    let capture = (demo.make)(&session.task)?;
     let loom = fit::fitted(session, &capture, &options(demo))?;
     let files = Files::of(demo, folder);
     let frames = Sampled::new(

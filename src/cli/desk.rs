@@ -1,26 +1,22 @@
 //! The recipe that the studio works on: its file, its runs, who else changes it, and the user's editor.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
+use super::reading::{Reading, entries, identity, saved};
 use super::runs::{Runs, cache_folder};
 use crate::diag::{Diagnostic, Result};
-use crate::io::{Depth, Disk, Wake, Watch};
+use crate::io::{Disk, Wake};
 use crate::mesh::{FrameSource, Sequence};
 use crate::pipeline::{self, Key, Value};
 use crate::recipe::{Failure, Outcome, Recipe, Request};
 use crate::task::Task;
 use crate::tui::{Desk, Kept};
-use crate::world::{Identity, World};
+use crate::world::{World, folder_of};
 
-/// A save is taken for finished when nothing has changed for this long: editors that truncate and write,
-/// or save twice in a row, are one save.
-const QUIET: Duration = Duration::from_millis(30);
-/// A file that keeps changing is read all the same after this long.
-const PATIENCE: Duration = Duration::from_millis(500);
 /// How often it is looked whether other files are to be watched, or none any more.
 const LOOK: Duration = Duration::from_millis(250);
 
@@ -36,14 +32,8 @@ pub(super) struct RecipeDesk {
     /// Frames per second of what is shown, where the user said so.
     fps: Option<f64>,
     file: Mutex<File>,
-    seen: Mutex<Seen>,
-}
-
-/// The files that the last run read, as they were before it, and the folders that they are in.
-#[derive(Default)]
-struct Seen {
-    files: BTreeMap<PathBuf, Option<Identity>>,
-    folders: BTreeSet<PathBuf>,
+    /// What the last run read.
+    seen: Mutex<Reading>,
 }
 
 /// The recipe's file as it is known.
@@ -78,25 +68,8 @@ impl RecipeDesk {
         self.file.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn seen(&self) -> MutexGuard<'_, Seen> {
+    fn seen(&self) -> MutexGuard<'_, Reading> {
         self.seen.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// What the files of the last run are like now.
-    fn identities(&self) -> BTreeMap<PathBuf, Option<Identity>> {
-        let seen = self.seen();
-        let files = seen.files.keys();
-        files.map(|file| (file.clone(), identity(file))).collect()
-    }
-
-    /// Remembers the files of a run as they were `before` it: what changes while it runs has changed.
-    fn see(&self, files: &[PathBuf], before: &BTreeMap<PathBuf, Option<Identity>>) {
-        let was = |file: &PathBuf| before.get(file).copied().unwrap_or_else(|| identity(file));
-        let seen = Seen {
-            files: files.iter().map(|file| (file.clone(), was(file))).collect(),
-            folders: files.iter().map(|file| above(file)).collect(),
-        };
-        *self.seen() = seen;
     }
 
     /// What has changed since it was last seen: the recipe's text, or (none) another file.
@@ -112,28 +85,16 @@ impl RecipeDesk {
         }
         let own = file.path.clone();
         drop(file);
-        let mut other = false;
-        for (path, before) in self
-            .seen()
-            .files
-            .iter_mut()
-            .filter(|(path, _)| **path != own)
-        {
-            let now = identity(path);
-            // A file that is being replaced is gone for a moment.
-            if now != *before && now.is_some() {
-                *before = now;
-                other = true;
-            }
-        }
-        Ok(other.then_some(None))
+        Ok(self.seen().changed(Some(&own)).then_some(None))
     }
 
     /// The folders of the recipe and of all that it read.
     fn folders(&self) -> BTreeSet<PathBuf> {
-        let own = above(&self.file().path);
-        let mut folders = self.seen().folders.clone();
-        folders.insert(own);
+        let own = folder_of(&self.file().path).to_path_buf();
+        let mut folders = self.seen().folders();
+        if own.is_dir() {
+            folders.insert(own);
+        }
         folders
     }
 
@@ -205,13 +166,13 @@ impl Desk for RecipeDesk {
             settings: settings.to_vec(),
             ..self.request.clone()
         };
-        let before = self.identities();
+        let (begun, before) = (SystemTime::now(), self.seen().again());
         let run = self.runs.run(recipe, &request, None, task);
-        let reads = match &run {
-            Ok(outcome) => &outcome.reads,
-            Err(failure) => &failure.reads,
+        let (reads, listings) = match &run {
+            Ok(outcome) => (&outcome.reads, &outcome.listings),
+            Err(failure) => (&failure.reads, &failure.listings),
         };
-        self.see(reads, &before);
+        *self.seen() = before.after(reads, listings, begun);
         let mut outcome = run?;
         if let (Value::Loom(loom), Some(fps)) = (&mut outcome.value, self.fps)
             && loom.source.is_none()
@@ -225,7 +186,7 @@ impl Desk for RecipeDesk {
     fn change(&self, task: &Task) -> Result<Option<Option<String>>> {
         loop {
             let folders = self.folders();
-            let watch = watch(&folders)?;
+            let watch = entries(&folders)?.output;
             // Also what has changed before the watch was set up.
             let mut look = true;
             loop {
@@ -237,7 +198,7 @@ impl Desk for RecipeDesk {
                 }
                 look = match watch.wait(LOOK) {
                     Wake::Changed(_) => {
-                        watch.calm(QUIET, PATIENCE, &mut BTreeSet::new());
+                        saved(&watch);
                         true
                     }
                     Wake::Quiet if self.folders() != folders => break,
@@ -291,24 +252,12 @@ impl Desk for RecipeDesk {
     }
 }
 
-fn watch(folders: &BTreeSet<PathBuf>) -> Result<Watch> {
-    let there = folders.iter().filter(|folder| folder.is_dir());
-    let folders: Vec<(PathBuf, Depth)> = there
-        .map(|folder| (folder.clone(), Depth::Entries))
-        .collect();
-    Ok(Watch::new(&folders, false)?.output)
-}
-
 /// The editor that the user has set.
 fn editor() -> String {
     let set = |name| std::env::var(name).ok().filter(|value| !value.is_empty());
     set("VISUAL")
         .or_else(|| set("EDITOR"))
         .unwrap_or_else(|| "vi".to_string())
-}
-
-fn identity(path: &Path) -> Option<Identity> {
-    Disk.identity(path).ok().flatten()
 }
 
 fn read(path: &Path) -> Result<String> {
@@ -336,14 +285,6 @@ fn free(path: &Path) -> PathBuf {
         .chain(numbered)
         .find(|path| identity(path).is_none())
         .unwrap_or_else(|| path.to_path_buf())
-}
-
-/// The folder that a file is in.
-fn above(file: &Path) -> PathBuf {
-    match file.parent() {
-        Some(parent) if parent != Path::new("") => parent.to_path_buf(),
-        _ => PathBuf::from("."),
-    }
 }
 
 /// The recipe that a capture or a loom begins with, and where it would be written: beside it.
@@ -401,7 +342,7 @@ mod tests {
     #[test]
     fn poses_begin_as_keys_and_many_by_what_they_have_in_common() {
         let folder = tempfile::tempdir().unwrap();
-        let poses = (crate::demo::Demo::find("cactus").unwrap().generate)();
+        let poses = crate::demo::Demo::find("cactus").unwrap().generate();
         let many = (0..18).flat_map(|i| poses.frame(i % 3).to_vec()).collect();
         let many = Sequence::new(Arc::clone(poses.topology()), many, None);
         let begun = |frames: &Sequence| {

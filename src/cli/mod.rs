@@ -9,6 +9,7 @@ mod desk;
 mod interrupt;
 mod print;
 mod progress;
+mod reading;
 mod recipes;
 mod report;
 mod runs;

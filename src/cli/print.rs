@@ -90,7 +90,12 @@ pub(super) fn as_data(diagnostic: &Diagnostic) -> Value {
     if let Some(file) = &mut shown.place.file {
         *file = file.to_string_lossy().into_owned().into();
     }
-    serde_json::to_value(&shown).unwrap_or_else(|_| json!({ "message": shown.message }))
+    let mut data =
+        serde_json::to_value(&shown).unwrap_or_else(|_| json!({ "message": shown.message }));
+    if let (Some(caret), Value::Object(map)) = (shown.caret(), &mut data) {
+        map.insert("caret".into(), caret.into());
+    }
+    data
 }
 
 /// What a failed run prints with `--json`.

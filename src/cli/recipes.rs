@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::diag::{Diagnostic, Result};
 use crate::recipe::Recipe;
-use crate::world::World;
+use crate::world::{World, folder_of};
 
 /// The stock recipes: name and text.
 pub(super) const STOCK: &[(&str, &str)] = &[
@@ -36,11 +36,8 @@ pub(super) const STOCK: &[(&str, &str)] = &[
 /// The folder to watch for a recipe that may change; none for a stock recipe.
 pub(super) fn folder(path: &Path) -> Option<PathBuf> {
     let stock = STOCK.iter().any(|(name, _)| Path::new(name) == path);
-    match path.parent() {
-        Some(folder) if folder != Path::new("") => Some(folder.to_path_buf()),
-        _ if stock && !path.exists() => None,
-        _ => Some(PathBuf::from(".")),
-    }
+    let named_only = stock && !path.exists();
+    (!named_only).then(|| folder_of(path).to_path_buf())
 }
 
 /// The recipe of that file, or the stock recipe of that name; a file goes first.
@@ -48,7 +45,13 @@ pub(super) fn folder(path: &Path) -> Option<PathBuf> {
 /// # Errors
 /// Neither exists, or the file is not text.
 pub(super) fn find(world: &dyn World, path: &Path) -> Result<Recipe> {
-    if world.identity(path)?.is_some() {
+    if let Some(found) = world.identity(path)? {
+        if found.folder {
+            return Diagnostic::error("a recipe is a file, this is a folder")
+                .in_file(path)
+                .hint("name a file that ends in .rhai")
+                .err();
+        }
         let text = String::from_utf8(world.read(path)?);
         return match text {
             Ok(text) if text.trim().is_empty() => Diagnostic::error("the recipe is empty")

@@ -1,30 +1,25 @@
 //! `meshloom run RECIPE [INPUT..]`: runs a recipe, once or whenever it or what it reads changes.
 
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, TryRecvError};
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, SystemTime};
 
 use serde_json::{Value as Json, json};
 
 use super::args::{Part, positive};
 use super::print;
+use super::reading::{Reading, entries, saved};
 use super::recipes;
 use super::report;
 use super::runs::{Runs, object};
 use super::session::{Outcome, Session};
 use crate::diag::{Result, Severity};
-use crate::io::{Depth, Disk, Wake, Watch};
+use crate::io::{Disk, Wake};
+use crate::pipeline::Listing;
 use crate::recipe::{self, Input, Param, Request};
 use crate::task::Task;
-use crate::world::World;
 
-/// A save is taken for finished when nothing has changed for this long: editors that truncate and write,
-/// or save twice in a row, are one save.
-const QUIET: Duration = Duration::from_millis(30);
-/// A file that keeps changing is read all the same after this long.
-const PATIENCE: Duration = Duration::from_millis(500);
 /// How soon a live run notices that it has ended.
 const LOOK: Duration = Duration::from_millis(5);
 /// A run that was cancelled and does not end for so long is no longer waited for.
@@ -80,6 +75,10 @@ pub(super) struct Args {
     /// End a run that takes longer, in seconds
     #[arg(long, value_name = "S", value_parser = positive)]
     time_limit: Option<f64>,
+
+    /// End a run whose values take more memory, in GiB (8)
+    #[arg(long, value_name = "GIB", value_parser = positive)]
+    memory_limit: Option<f64>,
 
     /// List the stock recipes
     #[arg(long)]
@@ -137,6 +136,9 @@ impl Args {
             settings: self.set.clone(),
             readable: self.allow_read.clone(),
             output: self.output.clone(),
+            memory: self
+                .memory_limit
+                .map(|gib| (gib * (1_u64 << 30) as f64) as usize),
         }
     }
 }
@@ -222,32 +224,40 @@ fn live(args: &Args, path: &Path, runs: Runs, session: &Session) -> Result<Outco
         time_limit: args.time_limit,
         runs,
     });
-    let mut reads = vec![path.to_path_buf()];
+    let mut reading = Reading::of(&[path.to_path_buf()]);
     loop {
-        let mut watch = session.keep(Watch::new(&folders(&reads), false)?);
+        let mut folders = reading.folders();
+        let mut watch = session.keep(entries(&folders)?);
         let task = session.task.sibling();
+        reading = reading.again();
         let begun = SystemTime::now();
         let mut run = job.start(&task);
-        let interrupted = changed(&watch, &reads, LOOK, || run.is_over());
-        if interrupted {
-            task.cancel();
-            run.wait(DROPPED);
+        while !run.is_over() {
+            if matches!(watch.wait(LOOK), Wake::Changed(_)) && reading.changed(None) {
+                task.cancel();
+                run.wait(DROPPED);
+                break;
+            }
         }
         session.progress.rest();
-        let mut quiet = !interrupted;
+        let interrupted = task.cancelled();
         if let Some(run) = run.answer {
             show(session, path, &run);
-            if run.reads != reads {
-                watch = session.keep(Watch::new(&folders(&run.reads), false)?);
+            reading = reading.after(&run.reads, &run.listings, begun);
+        }
+        // What was saved before it was watched has to be asked for.
+        let mut look = true;
+        while !interrupted && !(look && reading.changed(None)) {
+            let now = reading.folders();
+            look = now != folders;
+            if look {
+                watch = session.keep(entries(&now)?);
+                folders = now;
+            } else {
+                look = matches!(watch.wait(WAIT), Wake::Changed(_));
             }
-            reads = run.reads;
-            // What was saved before it was watched has to be asked for.
-            quiet &= !saved_since(&reads, begun);
         }
-        if quiet {
-            changed(&watch, &reads, WAIT, || false);
-        }
-        watch.calm(QUIET, PATIENCE, &mut BTreeSet::new());
+        saved(&watch);
     }
 }
 
@@ -291,6 +301,7 @@ impl Started {
 /// One run of a live session.
 struct Live {
     reads: Vec<PathBuf>,
+    listings: Vec<Listing>,
     outcome: Result<(recipe::Outcome, Vec<PathBuf>)>,
 }
 
@@ -314,6 +325,7 @@ impl Job {
             Err(error) => {
                 return Live {
                     reads: vec![self.path.clone()],
+                    listings: Vec::new(),
                     outcome: Err(error),
                 };
             }
@@ -322,6 +334,7 @@ impl Job {
         match self.runs.run(&recipe, request, self.time_limit, task) {
             Err(failure) => Live {
                 reads: failure.reads,
+                listings: failure.listings,
                 outcome: Err(failure.diagnostic),
             },
             Ok(outcome) => {
@@ -329,6 +342,7 @@ impl Job {
                 let written = self.runs.write(&outcome, output, request, task);
                 Live {
                     reads: outcome.reads.clone(),
+                    listings: outcome.listings.clone(),
                     outcome: written.map(|written| (outcome, written)),
                 }
             }
@@ -351,55 +365,4 @@ fn show(session: &Session, path: &Path, run: &Live) {
             session.event(&print::failure(error, &[]));
         }
     }
-}
-
-/// Waits until one of `files` changes; gives up, with false, once `ended` says so.
-fn changed(
-    watch: &Watch,
-    files: &[PathBuf],
-    look: Duration,
-    mut ended: impl FnMut() -> bool,
-) -> bool {
-    let files: BTreeSet<PathBuf> = files.iter().map(|file| plain(file)).collect();
-    loop {
-        match watch.wait(look) {
-            // Events were lost: anything may have changed.
-            Wake::Changed(paths) if paths.is_empty() => return true,
-            Wake::Changed(paths) if paths.iter().any(|path| files.contains(&plain(path))) => {
-                return true;
-            }
-            Wake::Changed(_) => {}
-            Wake::Quiet if ended() => return false,
-            Wake::Quiet => {}
-        }
-    }
-}
-
-/// Whether one of `files` was written between `begun` and now.
-fn saved_since(files: &[PathBuf], begun: SystemTime) -> bool {
-    let since_1970 = |time: SystemTime| time.duration_since(UNIX_EPOCH).unwrap_or_default();
-    let run = since_1970(begun)..=since_1970(SystemTime::now());
-    files.iter().any(|file| {
-        let found = Disk.identity(file).ok().flatten();
-        let modified = found.and_then(|found| found.modified);
-        modified.is_some_and(|modified| run.contains(&modified))
-    })
-}
-
-/// The folders that hold `files`; folders among them are watched themselves.
-fn folders(files: &[PathBuf]) -> Vec<(PathBuf, Depth)> {
-    let above = |file: &PathBuf| match file.parent() {
-        Some(parent) if parent != Path::new("") => parent.to_path_buf(),
-        _ => PathBuf::from("."),
-    };
-    let folders: BTreeSet<PathBuf> = files.iter().map(above).collect();
-    folders
-        .into_iter()
-        .map(|folder| (folder, Depth::Entries))
-        .collect()
-}
-
-/// The one name of a path: a watch gives absolute paths, a recipe those it was given.
-fn plain(path: &Path) -> PathBuf {
-    std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf())
 }

@@ -93,9 +93,14 @@ impl Runs {
         let _ = clock.join();
         outcome.map_err(|mut failure| {
             if late.load(Ordering::Relaxed) && failure.diagnostic.severity == Severity::Cancelled {
-                let error = Diagnostic::error(format!("the recipe took longer than {limit} s"))
-                    .in_file(&recipe.path);
-                failure.diagnostic = Box::new(error.hint("`--time-limit` sets the limit"));
+                // where it was then
+                let Diagnostic { place, excerpt, .. } = *failure.diagnostic;
+                let error = Diagnostic::error(format!("the recipe took longer than {limit} s"));
+                failure.diagnostic = Box::new(Diagnostic {
+                    place,
+                    excerpt,
+                    ..error.hint("`--time-limit` sets the limit")
+                });
             }
             failure
         })

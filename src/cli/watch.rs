@@ -428,8 +428,8 @@ impl Shop<'_> {
                 &job.capture.inputs,
             ))),
             settings: self.args.set.clone(),
-            readable: Vec::new(),
             output: Some(staged.to_path_buf()),
+            ..Request::default()
         }
     }
 

@@ -9,6 +9,7 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use crate::mesh::{Sequence, Topology};
+use crate::task::{Cancelled, Task};
 
 use super::bend::bent;
 use super::lattice::Lattice;
@@ -20,7 +21,8 @@ const FRAMES_A_PART: usize = 40;
 const FPS: f64 = 30.0;
 
 /// Bend to 170 degrees and back, twist to 180 degrees and back, both at once and back.
-pub(super) fn generate() -> Sequence {
+pub(super) fn generate(task: &Task) -> Result<Sequence, Cancelled> {
+    task.check()?;
     let quads = LATTICE.surface_quads();
     let vertices = LATTICE.surface_points().len();
     let topology = Topology::new(vertices, &vec![4; quads.len()], quads.concat());
@@ -29,7 +31,7 @@ pub(super) fn generate() -> Sequence {
         let (bend, twist) = angles(frame);
         pose(bend, twist)
     });
-    Sequence::new(topology, positions.collect(), Some(FPS))
+    Ok(Sequence::new(topology, positions.collect(), Some(FPS)))
 }
 
 /// Bend and twist, in radians, of `frame`.

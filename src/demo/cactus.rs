@@ -7,6 +7,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use crate::mesh::{Sequence, Topology};
+use crate::task::{Cancelled, Task};
 
 use super::bend::bent;
 use super::implicit::{Blob, Field, Flesh, Part, carve};
@@ -22,7 +23,7 @@ const RIBS: f64 = 9.0;
 const FURROW: f64 = 0.09;
 
 /// The three poses.
-pub(super) fn generate() -> Sequence {
+pub(super) fn generate(task: &Task) -> Result<Sequence, Cancelled> {
     let body = Body {
         flesh: Flesh {
             parts: limbs(),
@@ -30,8 +31,8 @@ pub(super) fn generate() -> Sequence {
         },
     };
     let grid = Grid::uniform([-0.9, -0.1, -0.4], [0.9, HEIGHT + 0.1, 0.4], STEP);
-    let mut mesh = polygonise(&body, &grid);
-    mesh.relax(&body, 6);
+    let mut mesh = polygonise(&body, &grid, task)?;
+    mesh.relax(&body, 6, task)?;
     let rest: Vec<Vector3<f64>> = mesh
         .points
         .iter()
@@ -43,7 +44,7 @@ pub(super) fn generate() -> Sequence {
         .flat_map(|towards| pose(&rest, towards));
     let topology = Topology::from_triangles(rest.len(), &mesh.triangles());
     let topology = topology.expect("faces name their own points");
-    Sequence::new(Arc::new(topology), poses.collect(), None)
+    Ok(Sequence::new(Arc::new(topology), poses.collect(), None))
 }
 
 /// Trunk and two arms, in the plane z = 0.

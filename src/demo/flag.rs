@@ -12,6 +12,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use crate::mesh::{Sequence, Topology};
+use crate::task::{Cancelled, Task};
 
 /// Quads along the flag and along the pole.
 const QUADS: [usize; 2] = [48, 32];
@@ -30,10 +31,11 @@ const AIR: f64 = 1.2;
 const DRAG: f64 = 0.8;
 
 /// One hundred frames, flying.
-pub(super) fn generate() -> Sequence {
+pub(super) fn generate(task: &Task) -> Result<Sequence, Cancelled> {
     let mut cloth = Cloth::new();
     let mut positions = Vec::with_capacity(3 * cloth.points.len() * FRAMES);
     for frame in 0..BEFORE + FRAMES {
+        task.check()?;
         if frame >= BEFORE {
             positions.extend(
                 cloth
@@ -47,7 +49,8 @@ pub(super) fn generate() -> Sequence {
             cloth.step(seconds, 1.0 / (FPS * STEPS_A_FRAME as f64));
         }
     }
-    Sequence::new(Arc::new(topology()), positions, Some(FPS))
+    let topology = Arc::new(topology());
+    Ok(Sequence::new(topology, positions, Some(FPS)))
 }
 
 fn topology() -> Topology {

@@ -17,6 +17,7 @@ mod skin;
 mod surface_nets;
 
 use crate::mesh::Sequence;
+use crate::task::{Cancelled, Task};
 
 pub use bar::pose as bar_pose;
 pub use face::NAMES as FACE_POSES;
@@ -44,8 +45,8 @@ pub struct Demo {
     pub travels: bool,
     /// A good first view: yaw and pitch of an orbiting camera, in radians.
     pub view: [f64; 2],
-    /// Makes it.
-    pub generate: fn() -> Sequence,
+    /// Makes it, unless the task is cancelled.
+    pub make: fn(&Task) -> Result<Sequence, Cancelled>,
 }
 
 /// All built-in captures, the one to start with first.
@@ -56,7 +57,7 @@ pub const DEMOS: &[Demo] = &[
         kind: Kind::Motion,
         travels: false,
         view: [0.35, 0.1],
-        generate: horse::gallop,
+        make: horse::gallop,
     },
     Demo {
         name: "walk",
@@ -64,7 +65,7 @@ pub const DEMOS: &[Demo] = &[
         kind: Kind::Motion,
         travels: true,
         view: [0.35, 0.1],
-        generate: horse::walk,
+        make: horse::walk,
     },
     Demo {
         name: "flag",
@@ -72,7 +73,7 @@ pub const DEMOS: &[Demo] = &[
         kind: Kind::Motion,
         travels: false,
         view: [0.5, 0.2],
-        generate: flag::generate,
+        make: flag::generate,
     },
     Demo {
         name: "jelly",
@@ -80,7 +81,7 @@ pub const DEMOS: &[Demo] = &[
         kind: Kind::Motion,
         travels: false,
         view: [0.5, 0.2],
-        generate: jelly::generate,
+        make: jelly::generate,
     },
     Demo {
         name: "face",
@@ -88,7 +89,7 @@ pub const DEMOS: &[Demo] = &[
         kind: Kind::Poses,
         travels: false,
         view: [0.3, 0.05],
-        generate: face::generate,
+        make: face::generate,
     },
     Demo {
         name: "bar",
@@ -96,7 +97,7 @@ pub const DEMOS: &[Demo] = &[
         kind: Kind::Motion,
         travels: false,
         view: [0.4, 0.3],
-        generate: bar::generate,
+        make: bar::generate,
     },
     Demo {
         name: "cactus",
@@ -104,7 +105,7 @@ pub const DEMOS: &[Demo] = &[
         kind: Kind::Poses,
         travels: false,
         view: [0.3, 0.2],
-        generate: cactus::generate,
+        make: cactus::generate,
     },
 ];
 
@@ -112,6 +113,19 @@ impl Demo {
     /// The capture of that name.
     pub fn find(name: &str) -> Option<&'static Demo> {
         DEMOS.iter().find(|demo| demo.name == name)
+    }
+
+    /// Makes it.
+    pub fn generate(&self) -> Sequence {
+        undisturbed(self.make)
+    }
+}
+
+/// What is made where nobody cancels.
+fn undisturbed(make: impl FnOnce(&Task) -> Result<Sequence, Cancelled>) -> Sequence {
+    match make(&Task::default()) {
+        Ok(sequence) => sequence,
+        Err(Cancelled) => unreachable!("nobody else has this task"),
     }
 }
 

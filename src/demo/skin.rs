@@ -8,6 +8,7 @@
 use nalgebra::Vector3;
 
 use super::implicit::{Blob, Flesh};
+use crate::task::{Cancelled, Task};
 
 /// Where a bone went: turned about its `rest` joint, which went to `joint`.
 #[derive(Debug, Clone, Copy)]
@@ -37,7 +38,8 @@ impl Skin {
         reach: f64,
         rounds: usize,
         stiff: &[usize],
-    ) -> Self {
+        task: &Task,
+    ) -> Result<Self, Cancelled> {
         let blobs: Vec<Blob> = flesh.blobs().copied().collect();
         let bones = blobs.iter().map(|blob| blob.bone + 1).max().unwrap_or(0);
         let mut weights: Vec<Vec<f64>> = points
@@ -51,12 +53,13 @@ impl Skin {
                 .for_each(|weight| *weight = if *weight > 0.5 { 1.0 } else { 0.0 });
         }
         for _ in 0..rounds {
+            task.check()?;
             weights = diffuse(&weights, neighbours, &held);
         }
-        Skin {
+        Ok(Skin {
             rest: points.to_vec(),
             weights: weights.iter().map(|row| leading(row)).collect(),
-        }
+        })
     }
 
     /// Appends the 3V coordinates of the skin over moved bones.

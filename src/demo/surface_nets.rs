@@ -8,6 +8,7 @@
 use nalgebra::Vector3;
 
 use super::implicit::Field;
+use crate::task::{Cancelled, Task};
 
 /// The planes of a grid along x, y and z, ascending.
 #[derive(Debug, Clone)]
@@ -55,8 +56,12 @@ impl Grid {
 }
 
 /// The surface of `field` as quads.
-pub(super) fn polygonise(field: &dyn Field, grid: &Grid) -> QuadMesh {
-    let mut values = sample(field, grid);
+pub(super) fn polygonise(
+    field: &dyn Field,
+    grid: &Grid,
+    task: &Task,
+) -> Result<QuadMesh, Cancelled> {
+    let mut values = sample(field, grid, task)?;
     fill_pinches(grid, &mut values);
     let mut mesh = QuadMesh::default();
     let mut names = vec![u32::MAX; values.len()];
@@ -73,7 +78,7 @@ pub(super) fn polygonise(field: &dyn Field, grid: &Grid) -> QuadMesh {
                 .extend(edge_quad(grid, &values, &names, node, axis));
         }
     }
-    mesh
+    Ok(mesh)
 }
 
 /// Side of the blocks of grid points that are tried as a whole, in grid points.
@@ -81,11 +86,12 @@ const BLOCK: usize = 6;
 
 /// The field at all grid points. Blocks that the surface cannot reach get the value of their middle,
 /// whose sign is right: the fields here fall and rise by at most 2 a unit of length.
-fn sample(field: &dyn Field, grid: &Grid) -> Vec<f64> {
+fn sample(field: &dyn Field, grid: &Grid, task: &Task) -> Result<Vec<f64>, Cancelled> {
     let size = grid.size();
     let mut values = vec![0.0; size[0] * size[1] * size[2]];
     let blocks = size.map(|count| count.div_ceil(BLOCK));
     for block in nodes(blocks) {
+        task.check()?;
         let first = block.map(|index| index * BLOCK);
         let last: [usize; 3] = std::array::from_fn(|i| (first[i] + BLOCK).min(size[i]) - 1);
         let (low, high) = (grid.point(first), grid.point(last));
@@ -100,7 +106,7 @@ fn sample(field: &dyn Field, grid: &Grid) -> Vec<f64> {
             };
         }
     }
-    values
+    Ok(values)
 }
 
 /// All index triples below `size`, the first slowest.
@@ -226,16 +232,23 @@ impl QuadMesh {
 
     /// Evens the mesh out on the level set of `field`: `rounds` times each vertex goes half the way
     /// to the mean of its neighbours and then down the gradient to the surface.
-    pub(super) fn relax(&mut self, field: &dyn Field, rounds: usize) {
+    pub(super) fn relax(
+        &mut self,
+        field: &dyn Field,
+        rounds: usize,
+        task: &Task,
+    ) -> Result<(), Cancelled> {
         let neighbours = self.neighbours();
         for _ in 0..rounds {
             let old = self.points.clone();
+            task.check()?;
             for (point, around) in self.points.iter_mut().zip(&neighbours) {
                 let sum: Vector3<f64> = around.iter().map(|&other| old[other as usize]).sum();
                 let moved = point.lerp(&(sum / around.len() as f64), 0.5);
                 *point = drop_to_surface(field, moved, 2);
             }
         }
+        Ok(())
     }
 
     /// Each quad cut along its shorter diagonal.

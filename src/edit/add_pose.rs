@@ -317,7 +317,7 @@ mod tests {
 
     #[test]
     fn a_map_of_poses_with_one_added_is_the_map_of_all() {
-        let poses = (Demo::find("cactus").expect("a demo").generate)();
+        let poses = Demo::find("cactus").expect("a demo").generate();
         let of = |count: usize| {
             let (poses, places) = (poses.slice(0..count), &TEST_PLACES[..count]);
             pose_map(&poses, places, "vertices", None, &Task::default()).unwrap()
@@ -358,7 +358,7 @@ mod tests {
 
     #[test]
     fn without_a_place_it_lies_where_its_distances_want_it() {
-        let poses = (Demo::find("cactus").expect("a demo").generate)();
+        let poses = Demo::find("cactus").expect("a demo").generate();
         let far = |i: usize, j: usize| {
             let pairs = poses.frame(i).iter().zip(poses.frame(j));
             let squares = pairs.map(|(a, b)| f64::from(a - b) * f64::from(a - b));

@@ -2,49 +2,111 @@
 
 use crate::loom::Loom;
 
-/// Ratios of the seam to the motion, in the shape subspace (rigid motion apart), at whole frames. Below 1
-/// it cannot be told from the motion.
+/// Ratios of the seam to the motion (PEERS.md E.6), in the shape subspace (rigid motion apart), at whole
+/// frames. Below 1 it cannot be told from the motion.
+///
+/// Differences between frames of which some are new, or which did not follow each other before, count
+/// whole. Those within the motion count by what the seam has changed in them: how it accelerates there by
+/// itself is no seam.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Seam {
-    /// Largest step at the seam over the mean step elsewhere.
+    /// Largest step at the seam over the mean step of the motion.
     pub step: f64,
-    /// Largest change of velocity from frame to frame at the seam over the largest elsewhere.
+    /// Largest change of velocity from frame to frame at the seam over the largest of the motion.
     pub velocity: f64,
-    /// Largest second difference at the seam over the median elsewhere.
+    /// Largest second difference at the seam over the median of the motion.
     pub acceleration: f64,
 }
 
-impl Seam {
-    /// Measures frames `first`..=`last` (from 1) of a loom against all its other frames. Ratios are 0
-    /// where the seam does not move, infinite where only the seam does.
-    pub fn measure(loom: &Loom, first: usize, last: usize) -> Self {
-        let n = loom.frames();
-        let at = |frame: usize| loom.coordinates_at(frame as f64).unwrap_or_default();
-        let x: Vec<Vec<f64>> = (1..=n).map(at).collect();
-        let velocities: Vec<Vec<f64>> = (1..=n).map(|frame| velocity(loom, frame as f64)).collect();
-        let steps = differences(&x);
+/// A motion at its frames, and what its seams are measured with.
+pub(super) struct Clip {
+    states: States,
+    /// Mean step, largest change of velocity and median second difference.
+    sizes: [f64; 3],
+}
+
+/// For each frame the coordinates in the shape subspace and their derivative.
+struct States {
+    x: Vec<Vec<f64>>,
+    v: Vec<Vec<f64>>,
+}
+
+impl States {
+    fn of(loom: &Loom) -> Self {
+        let times = || (1..=loom.frames()).map(|frame| frame as f64);
+        let at = |t: f64| loom.coordinates_at(t).unwrap_or_default();
+        States {
+            x: times().map(at).collect(),
+            v: times().map(|t| velocity(loom, t)).collect(),
+        }
+    }
+
+    /// Steps, changes of velocity and second differences, each from its first frame (from 0) on.
+    fn differences(&self) -> [Vec<Vec<f64>>; 3] {
+        let steps = differences(&self.x);
         let bends = differences(&steps);
-        let jumps = differences(&velocities);
-        let norms = |all: &[Vec<f64>]| all.iter().map(|v| norm(v)).collect::<Vec<_>>();
-        // A difference that starts at frame i (from 0) reaches over its order.
-        let touches = |i: usize, order: usize| i < last && i + 1 + order >= first;
-        let (steps, jumps, bends) = (norms(&steps), norms(&jumps), norms(&bends));
-        let largest = |values: &[f64], order: usize| -> f64 {
-            (0..values.len())
-                .filter(|&i| touches(i, order))
-                .map(|i| values[i])
-                .fold(0.0, f64::max)
-        };
-        let elsewhere = |values: &[f64], order: usize| -> Vec<f64> {
-            (0..values.len())
-                .filter(|&i| !touches(i, order))
-                .map(|i| values[i])
-                .collect()
-        };
+        [steps, differences(&self.v), bends]
+    }
+}
+
+impl Clip {
+    pub(super) fn of(loom: &Loom) -> Self {
+        let states = States::of(loom);
+        let [steps, jumps, bends] = states.differences().map(|all| norms(&all));
+        let sizes = [mean(&steps), most(&jumps), median(bends)];
+        Clip { states, sizes }
+    }
+
+    /// How many frames there are.
+    pub(super) fn frames(&self) -> usize {
+        self.states.x.len()
+    }
+
+    /// The squared distance of two frames, from 0.
+    pub(super) fn apart(&self, a: usize, b: usize) -> f64 {
+        let (a, b) = (&self.states.x[a], &self.states.x[b]);
+        a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
+    }
+
+    /// The mean step.
+    pub(super) fn step(&self) -> f64 {
+        self.sizes[0]
+    }
+
+    /// The median second difference.
+    pub(super) fn bend(&self) -> f64 {
+        self.sizes[2]
+    }
+}
+
+impl Seam {
+    /// Measures the seam of a loom with one pass more, all of whose frames up to `last` (from 1) are the
+    /// clip's own, and those from `next` on the clip's from `first` on. Ratios are 0 where the seam does
+    /// not move, infinite where only the seam does.
+    pub(super) fn measure(
+        clip: &Clip,
+        looped: &Loom,
+        last: usize,
+        (next, first): (usize, usize),
+    ) -> Self {
+        let orders = [1, 1, 2];
+        let (own, new) = (clip.states.differences(), States::of(looped).differences());
+        let [step, velocity, acceleration] = [0, 1, 2].map(|kind| {
+            let shown = new[kind].iter().enumerate().map(|(i, found)| {
+                // Its first frame is i + 1, its last i + 1 + order.
+                let before = (i + 1 + orders[kind] <= last).then(|| i);
+                let after = (i + 1 >= next).then(|| i + first - next);
+                match before.or(after).and_then(|i| own[kind].get(i)) {
+                    Some(own) => norm(&minus(found, own)),
+                    None => norm(found),
+                }
+            });
+            ratio(shown.fold(0.0, f64::max), clip.sizes[kind])
+        });
         Seam {
-            step: ratio(largest(&steps, 1), mean(&elsewhere(&steps, 1))),
-            velocity: ratio(largest(&jumps, 1), most(&elsewhere(&jumps, 1))),
-            acceleration: ratio(largest(&bends, 2), median(elsewhere(&bends, 2))),
+            step,
+            velocity,
+            acceleration,
         }
     }
 
@@ -55,7 +117,7 @@ impl Seam {
 }
 
 /// Derivative of the coordinates in the shape subspace.
-fn velocity(loom: &Loom, t: f64) -> Vec<f64> {
+pub(super) fn velocity(loom: &Loom, t: f64) -> Vec<f64> {
     let mut x = vec![0.0; loom.pose().modes()];
     if let (Some(p), Some(v)) = (loom.time().at(t), loom.time().velocity(t)) {
         loom.pose().along(p, v, &mut x);
@@ -63,9 +125,18 @@ fn velocity(loom: &Loom, t: f64) -> Vec<f64> {
     x
 }
 
+fn minus(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a - b).collect()
+}
+
 fn differences(rows: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    let difference = |pair: &[Vec<f64>]| pair[1].iter().zip(&pair[0]).map(|(b, a)| b - a).collect();
-    rows.windows(2).map(difference).collect()
+    rows.windows(2)
+        .map(|pair| minus(&pair[1], &pair[0]))
+        .collect()
+}
+
+fn norms(rows: &[Vec<f64>]) -> Vec<f64> {
+    rows.iter().map(|row| norm(row)).collect()
 }
 
 fn norm(v: &[f64]) -> f64 {
@@ -88,4 +159,23 @@ fn median(mut values: Vec<f64>) -> f64 {
 /// 0 where the seam does not move, infinite where only the seam does.
 fn ratio(seam: f64, motion: f64) -> f64 {
     if seam == 0.0 { 0.0 } else { seam / motion }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::loom::test_looms::ring;
+
+    #[test]
+    fn a_motion_against_itself_shows_nothing_within_it() {
+        let loom = ring(10, 30, true);
+        let clip = Clip::of(&loom);
+        // as if frames 12 and 13 met for the first time: what they do counts whole
+        let seam = Seam::measure(&clip, &loom, 12, (13, 13));
+        let step = norm(&minus(&clip.states.x[12], &clip.states.x[11]));
+        assert!((seam.step - step / clip.step()).abs() < 1e-12);
+        assert!(seam.acceleration > 0.5 && seam.acceleration < 2.0);
+        // all of it its own
+        assert_eq!(Seam::measure(&clip, &loom, 30, (31, 31)), Seam::default());
+    }
 }

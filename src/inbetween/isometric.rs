@@ -499,7 +499,7 @@ mod tests {
     use crate::mesh::Sequence;
 
     fn demo(name: &str, frames: [usize; 2]) -> (Topology, [Vec<f64>; 2]) {
-        let capture: Sequence = (Demo::find(name).unwrap().generate)();
+        let capture: Sequence = Demo::find(name).unwrap().generate();
         let pose = |frame| {
             let row = capture.frame(frame).iter();
             row.map(|&x| f64::from(x)).collect::<Vec<f64>>()

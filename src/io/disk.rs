@@ -25,6 +25,17 @@ const LOCK: &str = ".lock";
 pub struct Disk;
 
 impl World for Disk {
+    /// What is in memory and what was swapped out, from /proc.
+    fn memory_in_use(&self) -> Option<usize> {
+        let status = std::fs::read_to_string("/proc/self/status").ok()?;
+        let kilobytes = |name: &str| -> Option<usize> {
+            let line = status.lines().find_map(|line| line.strip_prefix(name))?;
+            line.trim().trim_end_matches("kB").trim_end().parse().ok()
+        };
+        let kept = kilobytes("VmRSS:")?;
+        Some(1024 * (kept + kilobytes("VmSwap:").unwrap_or(0)))
+    }
+
     fn read_into(&self, path: &Path, bytes: &mut Vec<u8>) -> Result<()> {
         bytes.clear();
         let read = File::open(path).and_then(|mut file| {

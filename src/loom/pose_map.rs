@@ -167,7 +167,7 @@ mod tests {
     use crate::demo::Demo;
 
     fn cactus() -> Sequence {
-        (Demo::find("cactus").expect("a demo").generate)()
+        Demo::find("cactus").expect("a demo").generate()
     }
 
     const PLACES: [Point; 3] = [[0.0, 0.0], [2.0, 0.0], [0.5, 1.5]];

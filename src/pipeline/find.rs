@@ -53,6 +53,31 @@ pub fn files(world: &dyn World, spec: &InputSpec) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
+/// What INPUT was found to stand for: a folder or a pattern may stand for other files later.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Listing {
+    spec: InputSpec,
+    /// None where nothing was found.
+    files: Option<Vec<PathBuf>>,
+}
+
+impl Listing {
+    /// The files of `spec` as they are now, and the listing to compare with later.
+    pub fn of(world: &dyn World, spec: &InputSpec) -> (Self, Result<Vec<PathBuf>>) {
+        let found = files(world, spec);
+        let listing = Listing {
+            spec: spec.clone(),
+            files: found.as_ref().ok().cloned(),
+        };
+        (listing, found)
+    }
+
+    /// What was asked for.
+    pub fn spec(&self) -> &InputSpec {
+        &self.spec
+    }
+}
+
 /// Finds the files that `spec` stands for.
 pub(super) fn find(world: &dyn World, spec: &InputSpec) -> Result<Files> {
     match spec.paths.as_slice() {

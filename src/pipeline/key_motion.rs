@@ -352,7 +352,7 @@ mod tests {
     use crate::sample::Times;
 
     fn cactus(request: CompleteRequest) -> KeyMotion {
-        let keys = (Demo::find("cactus").unwrap().generate)();
+        let keys = Demo::find("cactus").unwrap().generate();
         let keys = Keyed::new(keys, Key::of("cactus").finish());
         let completion = Completion { keys, request };
         KeyMotion::new(completion, &Task::default()).unwrap()
@@ -376,7 +376,7 @@ mod tests {
     #[test]
     fn changed_by_hand_it_is_the_motion_that_the_recipe_gives() {
         let hermite = |request: CompleteRequest| {
-            let keys = (Demo::find("cactus").unwrap().generate)();
+            let keys = Demo::find("cactus").unwrap().generate();
             let keys = Keyed::new(keys, Key::of("cactus").finish());
             let velocities = crate::pipeline::Velocities {
                 both: Some(keys),

@@ -36,7 +36,7 @@ mod workbench;
 pub use complete::{CompleteRequest, Velocities, complete, motion};
 pub use deliver::{deliver, plan_delivery};
 pub use describe::{Description, describe};
-pub use find::files;
+pub use find::{Listing, files};
 pub use input::{FrameRange, InputSpec};
 pub use key::{Key, KeyBuilder};
 pub use key_motion::{Completion, KeyControls, KeyMotion};

@@ -74,7 +74,7 @@ mod tests {
     #[test]
     fn built_in_captures_are_what_they_say() {
         for demo in DEMOS {
-            let frames = (demo.generate)();
+            let frames = demo.generate();
             // The bar twists to and fro between what it does.
             let some = frames.slice(0..frames.frames().min(16));
             assert_eq!(separate(&some), demo.kind == Kind::Poses, "{}", demo.name);

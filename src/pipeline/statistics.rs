@@ -389,7 +389,7 @@ mod tests {
     use crate::plot::Item;
 
     fn cactus() -> Sequence {
-        (Demo::find("cactus").unwrap().generate)()
+        Demo::find("cactus").unwrap().generate()
     }
 
     fn found(space: &str) -> Statistics {

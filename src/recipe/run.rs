@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::Param;
 use crate::diag::{Diagnostic, Result};
-use crate::pipeline::{Completion, InputSpec, LoomValue, Step, Value};
+use crate::pipeline::{Completion, InputSpec, Listing, LoomValue, Step, Value};
 use crate::task::Task;
 
 /// The text of a recipe and where it came from.
@@ -36,6 +36,8 @@ pub struct Request {
     pub readable: Vec<PathBuf>,
     /// Where `save` may write: below this folder.
     pub output: Option<PathBuf>,
+    /// How many bytes the values of the run may take, the language's and native ones together.
+    pub memory: Option<usize>,
 }
 
 /// A value that the recipe wants written, and where. Nothing is written before the whole recipe has run.
@@ -65,6 +67,8 @@ pub struct Outcome {
     pub saves: Vec<Save>,
     /// Every file that was read, the recipe and its modules among them: what a live run watches.
     pub reads: Vec<PathBuf>,
+    /// What inputs were found to stand for: it may be more later.
+    pub listings: Vec<Listing>,
     /// The expensive steps.
     pub steps: Vec<Step>,
     /// What the recipe printed.
@@ -96,4 +100,6 @@ pub struct Failure {
     pub diagnostic: Box<Diagnostic>,
     /// What was read before.
     pub reads: Vec<PathBuf>,
+    /// What inputs were found to stand for before.
+    pub listings: Vec<Listing>,
 }

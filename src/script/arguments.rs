@@ -24,12 +24,15 @@ pub(super) fn number(value: &Dynamic, what: &str) -> Raw<f64> {
     }
 }
 
+/// No count is larger.
+const MOST: f64 = 1e9;
+
 /// A whole number of at least `least`; a float without a fraction counts.
 pub(super) fn count(value: &Dynamic, what: &str, least: usize) -> Raw<usize> {
     let number = number(value, what)?;
-    if number.fract() != 0.0 || number < least as f64 || number > 1e9 {
+    if number.fract() != 0.0 || number < least as f64 || number > MOST {
         return raise(Diagnostic::error(format!(
-            "{what} must be a whole number of at least {least}, got {number}"
+            "{what} must be a whole number from {least} to {MOST}, got {number}"
         )));
     }
     Ok(number as usize)

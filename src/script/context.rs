@@ -8,13 +8,13 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use rhai::{Dynamic, NativeCallContext};
 
 use super::arguments::Raw;
-use super::diagnostics::raise;
+use super::diagnostics::{at, raise};
 use super::functions;
 use crate::diag::{Diagnostic, Result};
 use crate::pipeline::{InputSpec, Memory, Step, Value, Workbench};
 use crate::recipe::{Input, Outcome, Param, Recipe, Request, Save, Setting, text};
 use crate::task::Task;
-use crate::world::World;
+use crate::world::{World, folder_of};
 
 /// All that one run has; shared by the engine, the functions and the module resolver.
 pub(super) struct Context {
@@ -44,10 +44,7 @@ impl Context {
         request: &Request,
         task: &Task,
     ) -> Result<Self> {
-        let folder = match recipe.path.parent() {
-            Some(folder) if folder != Path::new("") => folder.to_path_buf(),
-            _ => PathBuf::from("."),
-        };
+        let folder = folder_of(&recipe.path).to_path_buf();
         let mut readable = vec![folder.clone()];
         readable.extend(request.readable.iter().cloned());
         if let Some(Input::Files(spec)) = &request.input {
@@ -62,8 +59,13 @@ impl Context {
             scripts,
             ..Log::default()
         });
+        let bench = Workbench::new(world, memory, task.clone());
+        let bench = match request.memory {
+            Some(bytes) => bench.holding_at_most(bytes),
+            None => bench,
+        };
         Ok(Context {
-            bench: Workbench::new(world, memory, task.clone()),
+            bench,
             folder,
             request: request.clone(),
             readable,
@@ -227,9 +229,8 @@ impl Context {
                 .collect();
             let (line, column) = text::position(&recipe.text, call.at.start);
             if let Some(param) = functions::written_param(&written, line) {
-                self.declare(param).map_err(|error| {
-                    Box::new(error.in_file(&recipe.path).at_line(line).at_column(column))
-                })?;
+                self.declare(param)
+                    .map_err(|error| Box::new(at(*error, recipe, (line, column))))?;
             }
         }
         Ok(self.log().params.clone())
@@ -273,6 +274,7 @@ impl Context {
             params: log.params.clone(),
             saves: log.saves.clone(),
             reads,
+            listings: self.bench.listings(),
             steps,
             messages: log.messages.clone(),
             warnings: log.warnings.clone(),
@@ -282,17 +284,13 @@ impl Context {
 
 /// The folders that the inputs lie in: folders themselves, of files and patterns the folder above.
 fn roots(world: &dyn World, spec: &InputSpec) -> Vec<PathBuf> {
-    let above = |path: &PathBuf| match path.parent() {
-        Some(parent) if parent != Path::new("") => parent.to_path_buf(),
-        _ => PathBuf::from("."),
-    };
     let is_folder =
         |path: &PathBuf| matches!(world.identity(path), Ok(Some(found)) if found.folder);
     let root = |path: &PathBuf| {
         if is_folder(path) {
             path.clone()
         } else {
-            above(path)
+            folder_of(path).to_path_buf()
         }
     };
     spec.paths.iter().chain(&spec.mesh).map(root).collect()

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use rhai::{Dynamic, Engine, OptimizationLevel};
 
 use super::context::Context;
-use super::diagnostics::raise;
+use super::diagnostics::{raise, token};
 use super::functions;
 use super::modules::Modules;
 use crate::diag::Diagnostic;
@@ -21,8 +21,10 @@ const EXPRESSION_DEPTHS: (usize, usize) = (128, 64);
 const TEXT_BYTES: usize = 256 * 1024;
 /// Items of all arrays, or of all maps, in one value.
 const ITEMS: usize = 10_000;
-/// Variables at one time; with the sizes above this bounds what scripts can hold.
+/// Variables of one function at one time.
 const VARIABLES: usize = 1_000;
+/// After so many steps it is measured what the process holds.
+const MEASURED: u64 = 4096;
 /// Modules of one run.
 const MODULES: usize = 100;
 
@@ -62,8 +64,15 @@ pub(super) fn for_run(context: &Arc<Context>) -> Engine {
         context.folder().to_path_buf(),
         Arc::clone(context),
     ));
-    let task = context.task().clone();
-    engine.on_progress(move |_| task.cancelled().then_some(Dynamic::UNIT));
+    let watched = Arc::clone(context);
+    engine.on_progress(move |steps| {
+        if steps % MEASURED == 0
+            && let Err(error) = watched.bench().check_growth()
+        {
+            return Some(token(*error));
+        }
+        watched.task().cancelled().then_some(Dynamic::UNIT)
+    });
     let messages = Arc::clone(context);
     engine.on_print(move |text| messages.message(text));
     let messages = Arc::clone(context);

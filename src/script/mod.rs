@@ -12,12 +12,12 @@ mod reference;
 use std::path::Path;
 use std::sync::Arc;
 
-use rhai::{Dynamic, EvalAltResult};
+use rhai::Dynamic;
 
 use crate::diag::{Diagnostic, Result};
 use crate::pipeline::Memory;
 use crate::recipe::{Failure, Outcome, Param, Recipe, Request, Runner, text};
-use crate::task::{Cancelled, Task};
+use crate::task::Task;
 use crate::world::World;
 
 use arguments::closest;
@@ -63,16 +63,20 @@ impl Runner for Scripts {
         let early = |diagnostic| Failure {
             diagnostic,
             reads: vec![recipe.path.clone()],
+            listings: Vec::new(),
         };
         let context = self.context(recipe, request, task).map_err(early)?;
         let value = evaluate(&context, recipe, &self.reference);
-        let unused = |outcome: Outcome| undeclared(&outcome.params, request).map(|()| outcome);
+        let unused =
+            |outcome: Outcome| undeclared(recipe, &outcome.params, request).map(|()| outcome);
+        let last = |error| diagnostics::at_the_end(error, recipe);
         let outcome = value
-            .and_then(|value| context.outcome(value))
+            .and_then(|value| context.outcome(value).map_err(last))
             .and_then(unused);
         outcome.map_err(|diagnostic| Failure {
             diagnostic,
             reads: context.reads(),
+            listings: context.bench().listings(),
         })
     }
 
@@ -81,7 +85,7 @@ impl Runner for Scripts {
         compile(&engine::for_run(&context), &context, recipe)?;
         resolve_functions(recipe, &self.reference)?;
         let params = context.declared_params(recipe)?;
-        undeclared(&params, request)?;
+        undeclared(recipe, &params, request)?;
         Ok(params)
     }
 }
@@ -99,13 +103,14 @@ fn evaluate(context: &Arc<Context>, recipe: &Recipe, reference: &Reference) -> R
     let engine = engine::for_run(context);
     let ast = compile(&engine, context, recipe)?;
     let sources = |path: &Path| context.script(path);
-    engine
-        .eval_ast::<Dynamic>(&ast)
-        .map_err(|error| match *error {
-            EvalAltResult::ErrorTerminated(..) => Cancelled.into(),
-            _ if context.task().cancelled() => Cancelled.into(),
-            error => diagnostics::failure(&error, &recipe.path, reference, &sources),
-        })
+    engine.eval_ast::<Dynamic>(&ast).map_err(|error| {
+        let failed = diagnostics::failure(&error, &recipe.path, reference, &sources);
+        // Whatever a cancelled step says of itself, that is why it failed.
+        match context.task().cancelled() {
+            true => diagnostics::interrupted(*failed),
+            false => failed,
+        }
+    })
 }
 
 /// Every function that the recipe calls by name must exist, here or in the recipe itself.
@@ -117,21 +122,14 @@ fn resolve_functions(recipe: &Recipe, reference: &Reference) -> Result<()> {
             continue;
         }
         let (line, column) = text::position(&recipe.text, call.at.start);
-        let error = Diagnostic::error(format!("no function `{}`", call.name))
-            .in_file(&recipe.path)
-            .at_line(line)
-            .at_column(column);
-        let error = error.excerpt(text::line(&recipe.text, line));
-        return match closest(&call.name, reference.names()) {
-            Some(near) => error.hint(format!("did you mean `{near}`?")).err(),
-            None => error.err(),
-        };
+        let error = diagnostics::no_function(&call.name, "", reference);
+        return diagnostics::at(error, recipe, (line, column)).err();
     }
     Ok(())
 }
 
 /// What is set must have been declared.
-fn undeclared(params: &[Param], request: &Request) -> Result<()> {
+fn undeclared(recipe: &Recipe, params: &[Param], request: &Request) -> Result<()> {
     let unknown = request
         .settings
         .iter()
@@ -140,6 +138,7 @@ fn undeclared(params: &[Param], request: &Request) -> Result<()> {
         return Ok(());
     };
     let error = Diagnostic::error(format!("the recipe declares no parameter `{name}`"));
+    let error = error.in_file(&recipe.path);
     let list: Vec<_> = params.iter().map(describe).collect();
     let declared = if list.is_empty() {
         "it declares none".to_string()

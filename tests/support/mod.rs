@@ -2,6 +2,7 @@
 #![allow(dead_code, unreachable_pub)] // each test program uses its part
 
 pub mod capture;
+pub mod kitchen;
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};

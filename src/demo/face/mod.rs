@@ -12,6 +12,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use crate::mesh::{Sequence, Topology};
+use crate::task::{Cancelled, Task};
 
 use super::surface_nets::polygonise;
 
@@ -20,13 +21,14 @@ use expression::POSES;
 pub use expression::NAMES;
 
 /// The nine poses, neutral first.
-pub(super) fn generate() -> Sequence {
+pub(super) fn generate(task: &Task) -> Result<Sequence, Cancelled> {
     let head = head::Head::new();
-    let mut mesh = polygonise(&head, &head::grid());
-    mesh.relax(&head, 5);
+    let mut mesh = polygonise(&head, &head::grid(), task)?;
+    mesh.relax(&head, 5, task)?;
     let neighbours = mesh.neighbours();
     let mut positions = Vec::with_capacity(3 * mesh.points.len() * POSES.len());
     for expression in &POSES {
+        task.check()?;
         let shifts = mesh
             .points
             .iter()
@@ -40,7 +42,7 @@ pub(super) fn generate() -> Sequence {
     }
     let topology = Topology::from_triangles(mesh.points.len(), &mesh.triangles());
     let topology = topology.expect("faces name their own points");
-    Sequence::new(Arc::new(topology), positions, None)
+    Ok(Sequence::new(Arc::new(topology), positions, None))
 }
 
 /// Rounds in which the skin evens out what the muscles do to neighbouring vertices.

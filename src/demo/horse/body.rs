@@ -6,6 +6,7 @@ use crate::demo::implicit::{Field, Flesh, carve};
 use crate::demo::skin::Skin;
 use crate::demo::surface_nets::{Grid, polygonise};
 use crate::mesh::Topology;
+use crate::task::{Cancelled, Task};
 
 use super::{Build, anatomy};
 
@@ -39,14 +40,14 @@ impl Field for Standing {
 
 impl Body {
     /// Cut thick, then drawn tight.
-    pub(super) fn new(build: Build) -> Self {
+    pub(super) fn new(build: Build, task: &Task) -> Result<Self, Cancelled> {
         let flesh = Flesh {
             parts: anatomy::flesh(build),
             blend: BLEND,
         };
         let grid = Grid::uniform([-1.4, -0.15, -0.45], [1.65, 2.2, 0.45], step(build));
-        let mut mesh = polygonise(&Standing(flesh.thickened(THIN)), &grid);
-        mesh.relax(&Standing(flesh.clone()), 8);
+        let mut mesh = polygonise(&Standing(flesh.thickened(THIN)), &grid, task)?;
+        mesh.relax(&Standing(flesh.clone()), 8, task)?;
         let neighbours = mesh.neighbours();
         let skin = Skin::attach(
             &mesh.points,
@@ -55,10 +56,11 @@ impl Body {
             0.015,
             14,
             &anatomy::HOOVES,
-        );
+            task,
+        )?;
         let triangles = mesh.triangles();
         let topology = Topology::from_triangles(mesh.points.len(), &triangles);
         let topology = topology.expect("faces name their own points");
-        Body { topology, skin }
+        Ok(Body { topology, skin })
     }
 }

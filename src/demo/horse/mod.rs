@@ -11,6 +11,9 @@ mod pose;
 use std::sync::Arc;
 
 use crate::mesh::Sequence;
+use crate::task::{Cancelled, Task};
+
+use super::undisturbed;
 
 use anatomy::HOOVES;
 use body::Body;
@@ -27,18 +30,18 @@ pub enum Build {
 }
 
 /// Two strides of a gallop in place; the second a little longer, higher and prouder.
-pub(super) fn gallop() -> Sequence {
-    horse_gallop(Build::Light)
+pub(super) fn gallop(task: &Task) -> Result<Sequence, Cancelled> {
+    animate(Build::Light, &gait::gallop(), 60, 60.0, task)
 }
 
 /// Two and a half strides of a walk over the ground towards +x.
-pub(super) fn walk() -> Sequence {
-    animate(Build::Light, &gait::walk(), 83, 30.0)
+pub(super) fn walk(task: &Task) -> Result<Sequence, Cancelled> {
+    animate(Build::Light, &gait::walk(), 83, 30.0, task)
 }
 
 /// The gallop of the demo `gallop` by a horse of that build: 60 frames.
 pub fn horse_gallop(build: Build) -> Sequence {
-    animate(build, &gait::gallop(), 60, 60.0)
+    undisturbed(|task| animate(build, &gait::gallop(), 60, 60.0, task))
 }
 
 /// Ten poses of a horse of that build, the same for all: at rest; each leg, the others standing, pushed
@@ -51,21 +54,33 @@ pub fn horse_poses(build: Build) -> Sequence {
         stances.extend(MOMENTS.map(|time| gallop.one_leg(leg, time)));
     }
     stances.push(gallop.trunk_only(0.0));
-    skinned(build, stances.into_iter(), None)
+    undisturbed(|task| skinned(build, stances.into_iter(), None, task))
 }
 
-fn animate(build: Build, gait: &Gait, frames: usize, fps: f64) -> Sequence {
+fn animate(
+    build: Build,
+    gait: &Gait,
+    frames: usize,
+    fps: f64,
+    task: &Task,
+) -> Result<Sequence, Cancelled> {
     let stances = (0..frames).map(|frame| gait.at(frame as f64 / fps));
-    skinned(build, stances, Some(fps))
+    skinned(build, stances, Some(fps), task)
 }
 
-fn skinned(build: Build, stances: impl Iterator<Item = Stance>, fps: Option<f64>) -> Sequence {
-    let body = Body::new(build);
+fn skinned(
+    build: Build,
+    stances: impl Iterator<Item = Stance>,
+    fps: Option<f64>,
+    task: &Task,
+) -> Result<Sequence, Cancelled> {
+    let body = Body::new(build, task)?;
     let mut positions = Vec::new();
     for stance in stances {
+        task.check()?;
         body.skin.pose(&pose::bones(&stance), &mut positions);
     }
-    Sequence::new(Arc::new(body.topology), positions, fps)
+    Ok(Sequence::new(Arc::new(body.topology), positions, fps))
 }
 
 #[cfg(test)]

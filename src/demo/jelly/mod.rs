@@ -10,6 +10,7 @@ use nalgebra::Vector3;
 
 use crate::demo::surface_nets::polygonise;
 use crate::mesh::{Sequence, Topology};
+use crate::task::{Cancelled, Task};
 
 use solid::Solid;
 
@@ -26,12 +27,13 @@ const RELEASE: usize = 80;
 const LIFT: f64 = 1.1;
 
 /// Two hundred frames.
-pub(super) fn generate() -> Sequence {
-    let mut mesh = polygonise(&rabbit::Rabbit::new(), &rabbit::grid());
-    mesh.relax(&rabbit::Rabbit::new(), 6);
+pub(super) fn generate(task: &Task) -> Result<Sequence, Cancelled> {
+    let mut mesh = polygonise(&rabbit::Rabbit::new(), &rabbit::grid(), task)?;
+    mesh.relax(&rabbit::Rabbit::new(), 6, task)?;
     let mut solid = Solid::around(&mesh.points);
     let mut positions = Vec::with_capacity(3 * mesh.points.len() * FRAMES);
     for frame in 0..BEFORE + FRAMES {
+        task.check()?;
         if frame >= BEFORE {
             solid
                 .surface()
@@ -51,7 +53,7 @@ pub(super) fn generate() -> Sequence {
     }
     let topology = Topology::from_triangles(mesh.points.len(), &mesh.triangles());
     let topology = topology.expect("faces name their own points");
-    Sequence::new(Arc::new(topology), positions, Some(FPS))
+    Ok(Sequence::new(Arc::new(topology), positions, Some(FPS)))
 }
 
 /// How far the hand has moved: up with a smooth start and end.

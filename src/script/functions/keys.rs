@@ -1,47 +1,17 @@
 //! What lies between key poses.
 
 use rhai::plugin::*;
-use rhai::{Array, Engine, Map};
+use rhai::{Engine, Map};
 
-use crate::diag::{Diagnostic, Result};
-use crate::pipeline::{CompleteRequest, Frames, Times, Value, Velocities};
-use crate::script::arguments::{Options, Raw, items, numbers};
+use super::frames_of;
+use crate::diag::Diagnostic;
+use crate::pipeline::{CompleteRequest, Frames, Times, Velocities};
+use crate::script::arguments::{Options, Raw, numbers};
 use crate::script::context::Context;
 use crate::script::diagnostics::{pass, raise};
 
 pub(super) fn register(engine: &mut Engine) {
     engine.register_global_module(exported_module!(functions).into());
-}
-
-/// Shapes of one mesh: a sequence, a mesh, or an array of meshes.
-pub(super) fn shapes(context: &Context, value: Dynamic, what: &str) -> Raw<Frames> {
-    if value.is_array() {
-        let shape = |item: Dynamic| match pass(super::value(item))? {
-            Value::Shape(shape) => Ok(shape),
-            other => raise(Diagnostic::error(format!(
-                "{what} must be meshes, one is {}",
-                other.kind()
-            ))),
-        };
-        let items: Array = items(&value, what)?;
-        let shapes = items.into_iter().map(shape).collect::<Raw<Vec<_>>>()?;
-        return pass(context.bench().gather(&shapes));
-    }
-    pass(frames(context, value, what))
-}
-
-fn frames(context: &Context, value: Dynamic, what: &str) -> Result<Frames> {
-    match super::value(value)? {
-        Value::Sequence(frames) => Ok(frames),
-        Value::Loom(loom) => context.bench().frames_of(&loom),
-        Value::Shape(shape) => Ok(context.bench().single(&shape)),
-        other => Diagnostic::error(format!(
-            "{what} must be a sequence or an array of meshes, this is {}",
-            other.kind()
-        ))
-        .hint("such as `demo(\"cactus\")` or `[mesh(\"a.obj\"), mesh(\"b.obj\")]`")
-        .err(),
-    }
 }
 
 const OPTIONS: [&str; 17] = [
@@ -73,7 +43,9 @@ fn request(context: &Context, options: Map) -> Raw<CompleteRequest> {
     };
     let poses = |name: &str| {
         let value = options.get(name).cloned();
-        value.map(|value| shapes(context, value, name)).transpose()
+        value
+            .map(|value| pass(frames_of(context, value, name)))
+            .transpose()
     };
     let count = options.count("frames", 1)?.map(Times::Count);
     let at = list("at")?.map(Times::List);
@@ -137,7 +109,7 @@ mod functions {
     #[rhai_fn(name = "complete", return_raw)]
     pub fn complete_with(call: NativeCallContext, keys: Dynamic, options: Map) -> Raw<Frames> {
         let context = Context::of(&call)?;
-        let keys = shapes(&context, keys, "keys")?;
+        let keys = pass(frames_of(&context, keys, "keys"))?;
         let request = request(&context, options)?;
         let completed = pass(context.bench().complete(&keys, &request))?;
         Ok(context.warned(completed))

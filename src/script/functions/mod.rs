@@ -47,8 +47,9 @@ pub(super) fn register(engine: &mut Engine) {
     output::register(engine);
 }
 
-/// The frames that a value stands for: a sequence, a loom, a mesh, an array of meshes.
-pub(super) fn frames_of(context: &Context, value: Dynamic) -> Result<Frames> {
+/// The frames that a value stands for: a sequence, a loom, a mesh, an array of meshes. `what` names the
+/// argument.
+pub(super) fn frames_of(context: &Context, value: Dynamic, what: &str) -> Result<Frames> {
     if value.is_array() {
         let meshes = value.into_array().unwrap_or_default();
         return context.bench().gather(&shapes(meshes)?);
@@ -57,7 +58,14 @@ pub(super) fn frames_of(context: &Context, value: Dynamic) -> Result<Frames> {
         Value::Sequence(frames) => Ok(frames),
         Value::Loom(loom) => context.bench().frames_of(&loom),
         Value::Shape(shape) => Ok(context.bench().single(&shape)),
-        other => Diagnostic::error(format!("frames are wanted, this is {}", other.kind())).err(),
+        other => {
+            let message = format!("{what} must be frames, this is {}", other.kind());
+            let forms = "a sequence, a loom, a mesh or an array of meshes";
+            let hint = format!(
+                "{forms}, such as `demo(\"cactus\")` or `[mesh(\"a.obj\"), mesh(\"b.obj\")]`"
+            );
+            Diagnostic::error(message).hint(hint).err()
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 use rhai::plugin::*;
 use rhai::{Engine, Map};
 
-use super::keys::shapes;
+use super::frames_of;
 use crate::diag::Diagnostic;
 use crate::pipeline::{Frames, MorphMethod, MorphPath, MorphRequest};
 use crate::script::arguments::{Options, Raw, items, numbers};
@@ -86,7 +86,7 @@ mod functions {
     #[rhai_fn(name = "morph", return_raw)]
     pub fn morph_with(call: NativeCallContext, poses: Dynamic, options: Map) -> Raw<Frames> {
         let context = Context::of(&call)?;
-        let poses = shapes(&context, poses, "the poses")?;
+        let poses = pass(frames_of(&context, poses, "the poses"))?;
         let found = pass(context.bench().morph(&poses, &super::request(options)?))?;
         Ok(context.warned(found))
     }

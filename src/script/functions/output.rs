@@ -32,7 +32,10 @@ mod functions {
     #[rhai_fn(name = "compare", return_raw)]
     pub fn compare(call: NativeCallContext, a: Dynamic, b: Dynamic) -> Raw<Dynamic> {
         let context = Context::of(&call)?;
-        let (a, b) = (pass(frames_of(&context, a))?, pass(frames_of(&context, b))?);
+        let (a, b) = (
+            pass(frames_of(&context, a, "a"))?,
+            pass(frames_of(&context, b, "b"))?,
+        );
         Ok(dynamic(&pass(context.bench().compare(&a, &b))?))
     }
 
@@ -40,8 +43,9 @@ mod functions {
     ///
     /// `seam(loom, a, b)`
     ///
-    /// Gives a map with step, velocity, acceleration and worst: ratios to the largest in the motion itself;
-    /// above 1.5 the seam shows.
+    /// Gives a map with step, velocity, acceleration and worst: steps over the motion's mean, changes of
+    /// velocity over its largest, accelerations over its median; above 1.5 the seam shows. What the motion
+    /// does by itself on either side is no part of the seam.
     ///
     /// ```rhai
     /// let bar = fit(demo("bar"), #{ tolerance: 0.05 });
@@ -69,7 +73,7 @@ mod functions {
         if condition {
             Ok(())
         } else {
-            raise(Diagnostic::error(format!("check failed: {message}")))
+            raise(Diagnostic::error(format!("check failed: {message}")).hint("nothing is written"))
         }
     }
 
@@ -117,7 +121,7 @@ mod functions {
     #[rhai_fn(name = "sheet", return_raw)]
     pub fn sheet(call: NativeCallContext, value: Dynamic, path: &str) -> Raw<()> {
         let context = Context::of(&call)?;
-        let frames = pass(frames_of(&context, value))?;
+        let frames = pass(frames_of(&context, value, "value"))?;
         let picture = pass(context.bench().sheet(&frames, path))?;
         pass(context.save(Value::Picture(Arc::new(picture)), path))
     }

@@ -38,7 +38,7 @@ fn placed(poses: Array) -> Raw<(Vec<ShapeValue>, Vec<[f64; 2]>)> {
 fn side(context: &Context, shapes: Dynamic) -> Raw<Frames> {
     match shapes.clone().into_string() {
         Ok(pattern) => pass(super::sources::open_pattern(context, &pattern)),
-        Err(_) => pass(frames_of(context, shapes)),
+        Err(_) => pass(frames_of(context, shapes, "the examples")),
     }
 }
 

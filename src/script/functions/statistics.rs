@@ -5,7 +5,7 @@ use std::sync::Arc;
 use rhai::plugin::*;
 use rhai::{Engine, Map};
 
-use super::keys::shapes;
+use super::frames_of;
 use super::sources::dynamic;
 use crate::pipeline::{ShapeValue, StatisticsRequest, StatisticsValue, Value};
 use crate::script::arguments::{Options, Raw, count, number};
@@ -20,9 +20,7 @@ pub(super) fn register(engine: &mut Engine) {
 fn request(options: Map) -> Raw<StatisticsRequest> {
     let options = Options::new(options, &["space", "scale_free"])?;
     let default = StatisticsRequest::default();
-    let free = options
-        .get("scale_free")
-        .and_then(|value| value.as_bool().ok());
+    let free = options.truth("scale_free")?;
     Ok(StatisticsRequest {
         space: options.word("space")?.unwrap_or(default.space),
         scale_free: free.unwrap_or(default.scale_free),
@@ -31,7 +29,7 @@ fn request(options: Map) -> Raw<StatisticsRequest> {
 
 fn analysed(call: &NativeCallContext, given: Dynamic, options: Map) -> Raw<StatisticsValue> {
     let context = Context::of(call)?;
-    let poses = shapes(&context, given, "the poses")?;
+    let poses = pass(frames_of(&context, given, "the poses"))?;
     pass(context.bench().statistics(&poses, &request(options)?))
 }
 

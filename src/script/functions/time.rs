@@ -69,8 +69,8 @@ mod functions {
     ///
     /// `loom.add_loop(a, b)`, `loom.add_loop(a, b, #{ times, bridge })`
     ///
-    /// a and b are times in frames; b is moved so that the loop takes whole frames, and knots are put at
-    /// both. n grows by the frames inside and the bridges; frames more than two spans from a seam keep
+    /// a and b are times in frames; b is moved so that the loop takes whole frames (a warning tells where
+    /// to), and knots are put at both. n grows by the frames inside and the bridges; frames more than two spans from a seam keep
     /// their bits. Where the ends lie apart, `bridge` frames go between two passes (default: the distance
     /// over the local speed, and more until the seam does not show; 0: none).
     ///
@@ -104,6 +104,47 @@ mod functions {
             bridge: options.count("bridge", 0)?,
         };
         edited(&call, &loom, &edit)
+    }
+
+    /// Finds the loop whose seam shows least: gives [a, b].
+    ///
+    /// `loom.find_loop()`, `loom.find_loop(shortest, longest)`
+    ///
+    /// Loops take whole frames, from `shortest` to `longest` of them (an eighth of the motion to all of
+    /// it). Ends are alike in shape and in speed, wherever the body has travelled.
+    ///
+    /// ```rhai
+    /// let gallop = fit(demo("gallop"), #{ tolerance: 0.05 });
+    /// let ends = gallop.find_loop(20, 40);
+    /// check(seam(gallop, ends[0], ends[1]).worst <= 1.5, "it closes");
+    /// check(gallop.add_loop(ends[0], ends[1]).frames > 80, "a stride more");
+    /// ```
+    #[rhai_fn(name = "find_loop", return_raw)]
+    pub fn find_loop(call: NativeCallContext, loom: LoomValue) -> Raw<Array> {
+        let n = loom.loom.value.frames();
+        find_loop_of(
+            call,
+            loom,
+            Dynamic::from((n / 8).max(1) as i64),
+            Dynamic::from(n as i64),
+        )
+    }
+
+    #[rhai_fn(name = "find_loop", return_raw)]
+    pub fn find_loop_of(
+        call: NativeCallContext,
+        loom: LoomValue,
+        shortest: Dynamic,
+        longest: Dynamic,
+    ) -> Raw<Array> {
+        let lengths = (
+            count(&shortest, "shortest", 1)?,
+            count(&longest, "longest", 1)?,
+        );
+        let found = Context::of(&call)?
+            .bench()
+            .find_loop(&loom, lengths.0, lengths.1);
+        Ok(pass(found)?.map(Dynamic::from).to_vec())
     }
 
     /// Continues past the end: along the last speed, or around the loop if the ends meet.

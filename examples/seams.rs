@@ -1,0 +1,193 @@
+//! How much loops show: a spread of loops of every demo that moves, or of the capture of the command line.
+//!
+//! Loops of an eighth to three quarters of the motion are laid over it evenly and added as a recipe adds
+//! them, by `fit(input()).add_loop(a, b)`. The table gives for each the frames of the bridge and the ratios
+//! of its seam (PEERS.md E.6).
+//!
+//! ```text
+//! cargo run --release --example seams [CAPTURE] [--out FOLDER]
+//! ```
+
+mod support;
+
+use std::process::ExitCode;
+
+use meshloom::demo::{DEMOS, Kind};
+use meshloom::diag::Result;
+use meshloom::edit::{Looped, add_loop};
+use meshloom::loom::Loom;
+use meshloom::loom::fit::{FitOptions, fit};
+use meshloom::mesh::Sequence;
+use meshloom::signal::root::RootKind;
+use meshloom::task::Task;
+use support::{Figure, table};
+
+/// Seams above this show.
+const SHOWS: f64 = 1.5;
+
+fn main() -> ExitCode {
+    support::run("seams", |figure| {
+        for (name, sequence, travels) in captures(figure)? {
+            let root = if travels {
+                Some(RootKind::Ground)
+            } else {
+                None
+            };
+            let options = FitOptions {
+                root,
+                left_out: false,
+                ..FitOptions::default()
+            };
+            let loom = fit(&sequence, &options, &Task::default())?.output;
+            spread(figure, &name, &loom)?;
+        }
+        Ok(())
+    })
+}
+
+fn captures(figure: &Figure) -> Result<Vec<(String, Sequence, bool)>> {
+    if !figure.is_demo() {
+        return Ok(vec![("capture".to_string(), figure.capture("")?.0, false)]);
+    }
+    let motions = DEMOS.iter().filter(|demo| demo.kind == Kind::Motion);
+    Ok(motions
+        .map(|demo| (demo.name.to_string(), demo.generate(), demo.travels))
+        .collect())
+}
+
+/// The loops that are tried: from, to.
+fn loops(frames: usize) -> Vec<(usize, usize)> {
+    let mut all = Vec::new();
+    for eighths in [1, 2, 3, 4, 6] {
+        let length = (frames * eighths / 8).max(4);
+        let room = frames - 1 - length;
+        all.extend(
+            (0..=4)
+                .map(|i| 1 + room * i / 4)
+                .map(|from| (from, from + length)),
+        );
+    }
+    all
+}
+
+fn spread(figure: &mut Figure, name: &str, loom: &Loom) -> Result<()> {
+    let mut rows = Vec::new();
+    let mut worst = 0.0_f64;
+    let mut shown = 0;
+    let all = loops(loom.frames());
+    for &(from, to) in &all {
+        let began = std::time::Instant::now();
+        let looped = add_loop(loom, from as f64, to as f64, 1, None)?;
+        worst = worst.max(looped.seam.worst());
+        shown += usize::from(looped.seam.worst() > SHOWS);
+        let mut row = row((from, to), &looped, began.elapsed().as_millis());
+        row.extend(own(loom, from, to));
+        rows.push(row);
+        if std::env::var("PROFILE").is_ok_and(|p| p == format!("{from}..{to}")) {
+            profile(&looped, to);
+        }
+    }
+    println!("{name}");
+    table(
+        &[
+            "loop",
+            "bridge",
+            "step",
+            "velocity",
+            "acceleration",
+            "ms",
+            "b-1",
+            "b",
+            "a",
+            "a+1",
+        ],
+        &rows,
+    );
+    let statement = format!(
+        "{name}: {shown} of {} loops above {SHOWS}, the worst {worst:.2}",
+        all.len()
+    );
+    figure.goal(&statement, shown == 0);
+    Ok(())
+}
+
+fn row((from, to): (usize, usize), looped: &Looped, ms: u128) -> Vec<String> {
+    let seam = looped.seam;
+    let ratio = |value: f64| format!("{value:.2}{}", if value > SHOWS { " *" } else { "" });
+    vec![
+        format!("{from}..{to}"),
+        looped.bridge.to_string(),
+        ratio(seam.step),
+        ratio(seam.velocity),
+        ratio(seam.acceleration),
+        ms.to_string(),
+    ]
+}
+
+/// The motion's own accelerations about the ends, over their median.
+fn own(loom: &Loom, from: usize, to: usize) -> Vec<String> {
+    let n = loom.frames();
+    let x: Vec<Vec<f64>> = (1..=n)
+        .map(|t| loom.coordinates_at(t as f64).unwrap())
+        .collect();
+    let bend = |i: usize| -> f64 {
+        if i < 2 || i >= n {
+            return 0.0;
+        }
+        let (a, b, c) = (&x[i - 2], &x[i - 1], &x[i]);
+        (0..a.len())
+            .map(|k| {
+                let d = a[k] - 2.0 * b[k] + c[k];
+                d * d
+            })
+            .sum::<f64>()
+            .sqrt()
+    };
+    let mut all: Vec<f64> = (2..n).map(bend).collect();
+    all.sort_by(f64::total_cmp);
+    let median = all[all.len() / 2];
+    [to - 1, to, from, from + 1]
+        .iter()
+        .map(|&i| format!("{:.2}", bend(i) / median))
+        .collect()
+}
+
+fn profile(looped: &Looped, to: usize) {
+    let l = &looped.loom;
+    let n = l.frames();
+    let x: Vec<Vec<f64>> = (1..=n)
+        .map(|t| l.coordinates_at(t as f64).unwrap())
+        .collect();
+    let norm = |v: Vec<f64>| v.iter().map(|d| d * d).sum::<f64>().sqrt();
+    let bend = |i: usize| {
+        norm(
+            (0..x[0].len())
+                .map(|k| x[i - 2][k] - 2.0 * x[i - 1][k] + x[i][k])
+                .collect(),
+        )
+    };
+    let step = |i: usize| norm((0..x[0].len()).map(|k| x[i][k] - x[i - 1][k]).collect());
+    let mut all: Vec<f64> = (2..n).map(bend).collect();
+    all.sort_by(f64::total_cmp);
+    let median = all[all.len() / 2];
+    let mean = (1..n).map(step).sum::<f64>() / (n - 1) as f64;
+    println!(
+        "k {} n {n} l {} m {}",
+        l.time().controls().len(),
+        l.pose().sites().len(),
+        l.pose().modes()
+    );
+    for i in to.saturating_sub(8).max(2)..(to + looped.bridge + 10).min(n) {
+        let p = l.position_at(i as f64).unwrap();
+        let (place, _) = l.time().place_at(i as f64).unwrap();
+        println!(
+            "{i:4} span {:3}+{:.3} p {:8.4} {:8.4} step {:.2} acc {:.2}",
+            place.span,
+            place.offset,
+            p[0],
+            p[1],
+            step(i) / mean,
+            bend(i) / median
+        );
+    }
+}

@@ -1,0 +1,313 @@
+//! A part of the motion passed through again (CH12 §4.1, Fig. 5).
+//!
+//! Control points, knot intervals and frames of the loop are repeated, so k and n grow while l and m stay.
+//! Knots are put where the loop begins and ends, so that it takes whole frames and begins where it was
+//! asked to: rounded to the nearest knots instead, its ends would move by up to half a span (1.7 frames
+//! for a flag of 180 frames with k = 54) and its length would not be whole. What is rounded is the length:
+//! the end moves to a whole number of frames after the beginning, which is returned and told. The two
+//! spans before a seam and the two after it turn from the one into the other so that what shows of it is
+//! least (a third, where a knot was put, changes by rounding); all other frames keep their bits. Where the
+//! ends lie apart, frames with spans of their own lead from one to the other.
+
+mod plan;
+mod root;
+
+use super::forward::forward;
+use super::seam::{Clip, Seam};
+use crate::diag::{Diagnostic, Result, Warned};
+use crate::loom::Loom;
+use crate::math::b_spline::Point;
+use crate::signal::time::TimeSignal;
+use plan::Plan;
+
+/// Seams above this show.
+const SHOWS: f64 = 1.5;
+
+/// A loom with a loop more, and what was done.
+#[derive(Clone)]
+pub struct Looped {
+    /// The loom.
+    pub loom: Loom,
+    /// The loop that was repeated: as asked for, its end moved so that it takes whole frames.
+    pub stretch: (f64, f64),
+    /// By how many frames its end was moved for that.
+    pub moved: f64,
+    /// Frames between two passes.
+    pub bridge: usize,
+    /// How much the first seam shows.
+    pub seam: Seam,
+}
+
+impl From<Looped> for Warned<Loom> {
+    fn from(looped: Looped) -> Self {
+        let mut all = Warned::clean(looped.loom);
+        // Times that people compute miss whole numbers by rounding.
+        if looped.moved.abs() > 1e-9 {
+            let (from, to) = looped.stretch;
+            let message = format!("the loop goes from {from} to {to}: it takes whole frames");
+            all.warnings.push(Diagnostic::warning(message));
+        }
+        let worst = looped.seam.worst();
+        if worst > SHOWS {
+            let message =
+                format!("the loop's seam shows: {worst:.1} times the motion's own changes");
+            all.warnings.push(
+                Diagnostic::warning(message)
+                    .hint("a longer bridge, or ends where pose and direction agree, hide it"),
+            );
+        }
+        all
+    }
+}
+
+/// The loom that passes `times` times more through \[`from`, `to`\]. `to` is moved so that the loop takes
+/// whole frames. `bridge` frames go between two passes; none given: as many as the distance between the
+/// ends takes at the speed there (none where they meet), and a quarter more again and again until the
+/// seam does not show, at most two and a half times the loop (or 60). Frames outside the spans about a
+/// seam keep their bits; with root motion every pass adds the loop's increment.
+///
+/// # Errors
+/// The loop leaves \[1, n\], has no length or less than a frame; too many frames; time that runs back and
+/// forth; a loom that never moves.
+pub fn add_loop(
+    loom: &Loom,
+    from: f64,
+    to: f64,
+    times: usize,
+    bridge: Option<usize>,
+) -> Result<Looped> {
+    super::check_stretch(loom, from, to)?;
+    let forward = forward(loom)?;
+    let (from, to) = forward.stretch(from, to);
+    let length = (to - from).round().max(1.0);
+    let moved = from + length - to;
+    let to = from + length;
+    super::check_time(loom, to)?;
+    let wanted = bridge.unwrap_or_else(|| bridge_for(forward.loom.time(), from, to));
+    super::check_frames(
+        (length as usize)
+            .saturating_add(wanted)
+            .saturating_mul(times),
+    )?;
+    let clip = Clip::of(&forward.loom);
+    let attempt = |bridge: usize| Attempt::new(&forward.loom, &clip, (from, to), bridge);
+    let mut best = attempt(wanted)?;
+    // A seam that shows is given more time.
+    let (mut next, longest) = (wanted, most_bridged(length as usize));
+    while bridge.is_none() && times > 0 && best.seam.worst() > SHOWS {
+        next = (5 * next).div_ceil(4).max(next + 1);
+        if next > longest {
+            break;
+        }
+        let longer = attempt(next)?;
+        if longer.seam.worst() < best.seam.worst() {
+            best = longer;
+        }
+    }
+    let looped = match times {
+        1 => best.looped,
+        times => best.plan.repeat(&forward.loom, times, &best.eased)?,
+    };
+    let mirror = |t: f64| loom.frames() as f64 + 1.0 - t;
+    Ok(Looped {
+        loom: forward.restore(&looped)?,
+        stretch: match forward.reversed {
+            true => (mirror(to), mirror(from)),
+            false => (from, to),
+        },
+        moved,
+        bridge: best.plan.bridge,
+        seam: if times == 0 {
+            Seam::default()
+        } else {
+            best.seam
+        },
+    })
+}
+
+/// The longest bridge of a loop of so many frames.
+fn most_bridged(frames: usize) -> usize {
+    5 * frames.max(24) / 2
+}
+
+/// A pass more, on a loom without changes of time.
+struct Attempt {
+    plan: Plan,
+    /// The control points over a seam.
+    eased: Vec<Point>,
+    looped: Loom,
+    seam: Seam,
+}
+
+impl Attempt {
+    /// With that many frames over the seam.
+    fn new(loom: &Loom, clip: &Clip, (from, to): (f64, f64), bridge: usize) -> Result<Self> {
+        let plan = Plan::new(loom, from, to, bridge)?;
+        let eased = plan.eased(loom, clip)?;
+        let looped = plan.repeat(loom, 1, &eased)?;
+        let last = to.floor() as usize;
+        let again = (last + bridge + 1, from.floor() as usize + 1);
+        Ok(Attempt {
+            seam: Seam::measure(clip, &looped, last, again),
+            plan,
+            eased,
+            looped,
+        })
+    }
+}
+
+/// Frames that the way from f(b) to f(a) takes: its length over the speed there.
+pub(super) fn bridge_for(time: &TimeSignal, from: f64, to: f64) -> usize {
+    let size = |v: [f64; 2]| libm::hypot(v[0], v[1]);
+    let speed = |t: f64| time.velocity(t).map_or(0.0, size);
+    let at = |t: f64| time.at(t).unwrap_or_default();
+    let (a, b) = (at(from), at(to));
+    let gap = size([b[0] - a[0], b[1] - a[1]]);
+    let frames = (to - from).round().max(1.0);
+    let mean = (0..frames as usize)
+        .map(|i| speed(from + i as f64 + 0.5))
+        .sum::<f64>()
+        / frames;
+    // At an end that rests the speed there says nothing.
+    let local = (0.5 * (speed(from) + speed(to))).max(0.5 * mean);
+    let needed = if local > 0.0 {
+        (gap / local).round()
+    } else {
+        0.0
+    };
+    needed.min(frames.max(24.0)) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::edit::{retime, reverse};
+    use crate::loom::test_looms::{ring, travelling};
+
+    #[test]
+    fn frames_away_from_the_seams_keep_their_bits() {
+        let loom = ring(10, 45, false);
+        for (from, to, times, bridge) in [
+            (12.0, 32.0, 1, None),
+            (12.0, 32.0, 3, Some(2)),
+            (8.5, 25.5, 2, Some(0)),
+            (1.0, 45.0, 1, None),
+        ] {
+            let looped = add_loop(&loom, from, to, times, bridge).unwrap();
+            let (n, longer) = (loom.frames(), looped.loom.frames());
+            let pass = (to - from) as usize + looped.bridge;
+            assert_eq!(longer, n + times * pass);
+            let shift = (times * pass) as f64;
+            for frame in (1..=n).map(|frame| frame as f64) {
+                let before = loom.at(frame).unwrap();
+                // two spans are at most three frames and a half here
+                if frame < to - 4.0 {
+                    assert_eq!(looped.loom.at(frame).unwrap(), before, "{frame}");
+                }
+                if frame > from + 4.0 {
+                    assert_eq!(looped.loom.at(frame + shift).unwrap(), before, "{frame}");
+                }
+            }
+            assert_eq!(looped.loom.pose(), loom.pose());
+            assert_eq!(looped.loom.shape(), loom.shape());
+        }
+    }
+
+    #[test]
+    fn control_points_grow_by_those_of_the_loop() {
+        // a knot at every frame: no knot is put
+        let loom = ring(10, 40, true);
+        let looped = add_loop(&loom, 10.0, 30.0, 1, Some(0)).unwrap().loom;
+        assert_eq!(looped.frames(), 60);
+        assert_eq!(looped.time().controls().len(), 42 + 20);
+        let bridged = add_loop(&loom, 10.0, 30.0, 2, Some(3)).unwrap().loom;
+        assert_eq!(bridged.frames(), 40 + 2 * 23);
+        assert_eq!(bridged.time().controls().len(), 42 + 2 * 23);
+    }
+
+    #[test]
+    fn a_loop_that_closes_shows_no_seam_and_gets_no_bridge() {
+        // one turn of the ring takes 20.27 frames
+        let looped = add_loop(&ring(10, 60, true), 15.0, 35.0, 2, None).unwrap();
+        assert!(looped.bridge <= 1);
+        assert!(looped.seam.worst() < SHOWS, "{:?}", looped.seam);
+    }
+
+    #[test]
+    fn ends_that_lie_apart_are_bridged() {
+        let loom = ring(10, 21, true);
+        let bare = add_loop(&loom, 7.0, 15.0, 1, Some(0)).unwrap();
+        let bridged = add_loop(&loom, 7.0, 15.0, 1, None).unwrap();
+        assert!(bridged.bridge > 2);
+        assert!(bridged.seam.worst() < 0.5 * bare.seam.worst());
+        assert_eq!(Warned::from(bare).warnings.len(), 1);
+    }
+
+    #[test]
+    fn root_motion_travels_on_without_a_step() {
+        // the same motion from every frame to the next, within a loop, over a seam and a bridge
+        let loom = travelling(10, 45);
+        for (from, to, bridge) in [(10.0, 30.0, 0), (10.0, 30.0, 3), (10.5, 28.5, 2)] {
+            let looped = add_loop(&loom, from, to, 2, Some(bridge)).unwrap().loom;
+            let at = |frame: usize| looped.root_at(frame as f64).unwrap();
+            let step = |frame: usize| at(frame).inverse() * at(frame + 1);
+            let first = step(4).to_matrix();
+            for frame in 4..looped.frames() - 4 {
+                let error = (step(frame).to_matrix() - first).norm();
+                // the bridge takes the chord at half the turn; central differences are as good
+                assert!(error < 0.02, "{from} {bridge} {frame}: {error}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_reversed_loom_loops_where_it_says() {
+        let loom = travelling(10, 45);
+        let there = reverse(&add_loop(&loom, 12.0, 32.0, 1, None).unwrap().loom).unwrap();
+        let here = add_loop(&reverse(&loom).unwrap(), 14.0, 34.0, 1, None).unwrap();
+        assert_eq!(
+            (here.loom.time(), here.stretch),
+            (there.time(), (14.0, 34.0))
+        );
+    }
+
+    #[test]
+    fn a_retimed_loom_loops_on_its_new_frames() {
+        let loom = ring(10, 45, true);
+        let slow = retime(&loom, &[[1.0, 1.0], [89.0, 45.0]]).unwrap();
+        let looped = add_loop(&slow, 21.0, 61.0, 1, Some(0)).unwrap().loom;
+        assert_eq!(looped.frames(), 89 + 40);
+        for frame in (1..=50).map(f64::from) {
+            assert_eq!(looped.at(frame).unwrap(), slow.at(frame).unwrap());
+        }
+    }
+
+    #[test]
+    fn loops_that_are_none_are_refused() {
+        let loom = ring(5, 20, true);
+        for (from, to) in [
+            (9.0, 9.0),
+            (9.0, 3.0),
+            (0.5, 4.0),
+            (3.0, 20.5),
+            (f64::NAN, 4.0),
+        ] {
+            assert!(add_loop(&loom, from, to, 1, None).is_err());
+        }
+        assert!(add_loop(&loom, 3.0, 9.0, usize::MAX, None).is_err());
+        assert!(add_loop(&loom, 3.0, 9.0, 1, Some(usize::MAX)).is_err());
+        let none = add_loop(&loom, 3.0, 9.0, 0, None).unwrap();
+        assert_eq!(none.loom.time(), loom.time());
+    }
+
+    #[test]
+    fn an_end_that_was_moved_is_told() {
+        let loom = ring(10, 45, false);
+        let looped = add_loop(&loom, 12.25, 31.5, 1, None).unwrap();
+        assert_eq!((looped.stretch, looped.moved), ((12.25, 31.25), -0.25));
+        let told = Warned::from(looped).warnings;
+        assert!(told[0].message.contains("from 12.25 to 31.25"), "{told:?}");
+        let whole = add_loop(&loom, 12.0, 31.0, 1, None).unwrap();
+        assert_eq!(whole.moved, 0.0);
+    }
+}
