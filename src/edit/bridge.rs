@@ -364,12 +364,11 @@ mod tests {
 
     #[test]
     fn a_way_leads_through_the_shapes_between() {
-        // one turn of the ring takes 20.27 frames: from the 19th after it back by way of the others
-        let clip = Clip::of(&ring(10, 30, true));
+        // one turn of the ring takes 20.27 frames: the way from its end to its beginning is short
+        let clip = Clip::of(&ring(10, 20, true));
         assert_eq!(through(&clip, 3, 7), [3, 4, 5, 6, 7]);
         assert_eq!(through(&clip, 7, 7), [7]);
-        let round = through(&clip, 21, 3);
-        assert!(round.len() <= 4, "{round:?}");
+        assert_eq!(through(&clip, 18, 1), [18, 19, 0, 1]);
     }
 
     #[test]
