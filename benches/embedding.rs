@@ -7,7 +7,7 @@
 use std::f64::consts::TAU;
 
 use divan::{Bencher, black_box};
-use meshloom::inbetween::edge_lengths::{Embedded, Embedding, KeyShapes, Memory};
+use meshloom::inbetween::edge_lengths::{Blend, Embedded, Embedding, KeyShapes, Memory};
 use meshloom::math::block_sparse::BlockPattern;
 use meshloom::mesh::Topology;
 
@@ -64,7 +64,7 @@ fn cold(bencher: Bencher, vertices: usize) {
     bencher.bench_local(|| {
         let embedding = Embedding::new(&topology).expect("a tube fits in memory");
         let keys = KeyShapes::new(&embedding, &[&first, &second]);
-        let target = keys.blend(&[0.5, 0.5], false);
+        let target = keys.blend(&[0.5, 0.5], Blend::Lengths);
         black_box(
             embedding
                 .embed(&target, &mut Memory::default())
@@ -80,9 +80,9 @@ fn warm(bencher: Bencher, vertices: usize) {
     let embedding = Embedding::new(&topology).expect("a tube fits in memory");
     let keys = KeyShapes::new(&embedding, &[&first, &second]);
     let mut memory = Memory::default();
-    let before = keys.blend(&[0.5, 0.5], false);
+    let before = keys.blend(&[0.5, 0.5], Blend::Lengths);
     let found: Embedded = embedding.embed(&before, &mut memory).expect("triangles");
-    let mut target = keys.blend(&[0.49, 0.51], false);
+    let mut target = keys.blend(&[0.49, 0.51], Blend::Lengths);
     for (angle, (found, blended)) in target
         .dihedrals
         .iter_mut()

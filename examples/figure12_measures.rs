@@ -8,11 +8,11 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use meshloom::diag::{Diagnostic, Result};
-use meshloom::inbetween::edge_lengths::{EdgeFit, Embedding, KeyShapes, Options, morph};
+use meshloom::inbetween::edge_lengths::{Blend, EdgeFit, Embedding, KeyShapes, Options, morph};
 use meshloom::inbetween::isometric::{Alignment, Connectivity, Isometric};
 use meshloom::mesh::Topology;
 use meshloom::plot::{Chart, Panel, Scale, Series, Theme, Tint, chart};
-use meshloom::space::{SpaceError, Spaces};
+use meshloom::space::{SpaceError, Spaces, StraightPath};
 use meshloom::task::Task;
 
 use support::{Figure, rojas, table};
@@ -38,7 +38,7 @@ fn draw(figure: &mut Figure) -> Result<()> {
     let path: Vec<f64> = (0..=STEPS).map(|i| i as f64 / STEPS as f64).collect();
     let measured = |name, frames: Vec<Vec<f64>>| {
         let fits = path.iter().zip(&frames).map(|(&t, frame)| {
-            let asked = keys.blend(&[1.0 - t, t], false).lengths;
+            let asked = keys.blend(&[1.0 - t, t], Blend::Lengths).lengths;
             EdgeFit::new(&asked, &embedding.lengths(frame))
         });
         Measured {
@@ -130,21 +130,10 @@ fn blended(
     path: &[f64],
 ) -> Result<Vec<Vec<f64>>> {
     let space = Spaces::new(Arc::clone(topology), from).open(name, &[from, to])?;
-    let encoded = |pose: &[f64]| {
-        let mut row = vec![0.0; space.dimension()];
-        space.encode(pose, &mut row);
-        row
-    };
-    let (first, mut last) = (encoded(from), encoded(to));
-    space.follow(&first, &mut last);
+    let straight = StraightPath::new(space, from, to);
     let frame = |&t: &f64| {
-        let row: Vec<f64> = first
-            .iter()
-            .zip(&last)
-            .map(|(a, b)| a + t * (b - a))
-            .collect();
         let mut positions = vec![0.0; from.len()];
-        space.decode(&row, &mut positions);
+        straight.at(t, &mut positions);
         positions
     };
     Ok(path.iter().map(frame).collect())

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use meshloom::diag::{Diagnostic, Result};
 use meshloom::inbetween::conformal::{factors, scaled, sphere};
-use meshloom::inbetween::edge_lengths::{Embedding, KeyShapes, Memory};
+use meshloom::inbetween::edge_lengths::{Blend, Embedding, KeyShapes, Memory};
 use meshloom::mesh::Sequence;
 use meshloom::plot::{Scene, Theme};
 use meshloom::space::SpaceError;
@@ -47,7 +47,7 @@ fn draw(figure: &mut Figure) -> Result<()> {
     let mut shapes = vec![("k = 0".to_string(), head.clone())];
     let mut rows = Vec::new();
     for k in [0.25, 0.5, 0.75] {
-        let mut target = keys.blend(&[1.0 - k, k], false);
+        let mut target = keys.blend(&[1.0 - k, k], Blend::Lengths);
         target.lengths = scaled(embedding.edges(), &lengths, &found.factors, k);
         let made = embedding
             .embed(&target, &mut memory)
@@ -69,8 +69,9 @@ fn draw(figure: &mut Figure) -> Result<()> {
     }
     shapes.push(("k = 1".to_string(), round));
     println!(
-        "{} vertices; factors from {:.3} to {:.3}",
+        "{} vertices; equivalent to {:.1e}; factors from {:.3} to {:.3}",
         topology.vertices(),
+        found.residual,
         least(&found.factors),
         -least(&found.factors.iter().map(|u| -u).collect::<Vec<_>>())
     );

@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use meshloom::diag::{Diagnostic, Result};
 use meshloom::inbetween::edge_lengths::{
-    EdgeFit, Embedding, KeyShapes, Memory, Morph, Options, morph,
+    Blend, EdgeFit, Embedding, KeyShapes, Memory, Morph, Options, morph,
 };
 use meshloom::mesh::{Sequence, Topology};
 use meshloom::pipeline::{self, MorphMethod, MorphPath, MorphRequest};
@@ -86,7 +86,7 @@ fn one(figure: &mut Figure, scene: &mut Scene, theme: &Theme) -> Result<()> {
     let mut found = Vec::new();
     for pose in &poses {
         let keys = KeyShapes::new(&embedding, &[pose]);
-        let target = keys.blend(&[1.0], false);
+        let target = keys.blend(&[1.0], Blend::Lengths);
         let embedded = embedding.embed(&target, &mut Memory::default());
         found.push(embedded.map_err(|error| Box::new(Diagnostic::error(error.to_string())))?);
     }
@@ -132,11 +132,11 @@ fn embedded(
     topology: &Arc<Topology>,
     poses: &[&[f64]],
     weights: &[Vec<f64>],
-    squared: bool,
+    blend: Blend,
 ) -> Result<Morph> {
     let embedding = Embedding::new(topology).map_err(SpaceError::from)?;
     let keys = KeyShapes::new(&embedding, poses);
-    let options = Options { squared, every: 1 };
+    let options = Options { blend, every: 1 };
     morph(
         &embedding,
         topology,
@@ -161,7 +161,7 @@ fn three(
         .map(|i| f64::from(i) / 5.0)
         .map(|t| vec![1.0 - t, t])
         .collect();
-    let found = embedded(&topology, &[&straight, &bent], &weights, false)?;
+    let found = embedded(&topology, &[&straight, &bent], &weights, Blend::Lengths)?;
     lines.push(line("Fig. 3: arm", &found));
     let met = found
         .reports
@@ -283,8 +283,8 @@ fn barrel(
     let mut unevenness = Vec::new();
     let view = view(&topology, &[&ring, &tall], [0.4, 0.35]);
     let mut pictures = vec![shown(&view, "torus", &ring, GIVEN)];
-    for (name, squared) in [("lengths", false), ("squares", true)] {
-        let found = embedded(&topology, &[&ring, &tall], &weights, squared)?;
+    for (name, blend) in [("lengths", Blend::Lengths), ("squares", Blend::Squares)] {
+        let found = embedded(&topology, &[&ring, &tall], &weights, blend)?;
         lines.push(line(&format!("torus to barrel, {name}"), &found));
         let worst = found.frames[1..4]
             .iter()

@@ -1,7 +1,7 @@
-//! Statistics of shapes (Rojas et al. 2014, §4.3): barbells measured by their edge lengths and by aligned
-//! distances (Fig. 7), expressions brought from one face to another (Fig. 10), and a map of expressions
-//! by principal components (Fig. 9). With a capture, its frames are the expressions, the first the
-//! neutral one.
+//! Statistics of shapes (Rojas et al. 2014, §4): expressions brought from one face to another, and a map
+//! of expressions by principal components, in edge lengths and in shape spaces. With a capture, its
+//! frames are the expressions, the first the neutral one. The paper's own figures are `rojas_barbells`
+//! (7, 8) and `rojas_faces` (9, 10).
 
 mod support;
 
@@ -9,11 +9,10 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use meshloom::diag::{Diagnostic, Result};
-use meshloom::image::Image;
-use meshloom::mesh::{Bounds, Edges, FrameSource, Sequence, Topology};
+use meshloom::mesh::{Bounds, FrameSource, Sequence};
 use meshloom::pipeline::{StatisticsRequest, add_difference, statistics};
 use meshloom::plot::{Anchor, Scene, Theme};
-use meshloom::statistics::{EDGE_LENGTHS, Ground, aligned, aligned_rms, scale_free};
+use meshloom::statistics::{EDGE_LENGTHS, aligned_rms};
 use meshloom::task::Task;
 
 use support::{Figure, View, table};
@@ -23,127 +22,20 @@ fn main() -> ExitCode {
 }
 
 fn draw(figure: &mut Figure) -> Result<()> {
-    let bells = barbells();
-    compare_barbells(figure, &bells)?;
     let (faces, view) = figure.capture("face")?;
     if faces.frames() < 3 {
         return Diagnostic::error("expressions are three frames or more").err();
     }
     let transferred = transfer(figure, &faces)?;
     let map = expressions(figure, &faces)?;
-    figure.picture(&compose(&bells, &transferred, &view, map))
+    figure.picture(&compose(&transferred, &view, map))
 }
 
-// --- barbells
-
-/// Rings along a barbell and vertices around each.
-const RINGS: usize = 61;
-const AROUND: usize = 24;
-
-/// Long and short barbells with round ends, then with flat ends. They share their faces.
-fn barbells() -> Sequence {
-    let shapes = [(5.0, false), (1.6, false), (5.0, true), (1.6, true)];
-    let mut triangles = Vec::new();
-    let at = |i: usize, j: usize| (i * AROUND + j % AROUND) as u32;
-    for i in 1..RINGS {
-        for j in 0..AROUND {
-            let [a, b, c, d] = [at(i - 1, j), at(i, j), at(i, j + 1), at(i - 1, j + 1)];
-            triangles.extend([[a, b, c], [a, c, d]]);
-        }
-    }
-    let topology = Topology::from_triangles(RINGS * AROUND, &triangles).expect("a tube");
-    let positions = shapes.iter().flat_map(|&(bar, flat)| barbell(bar, flat));
-    Sequence::new(Arc::new(topology), positions.collect(), None)
-}
-
-/// A third of the rings for each end, the others for the bar. Round ends are balls, flat ones discs.
-fn barbell(bar: f64, flat: bool) -> Vec<f32> {
-    let third = RINGS / 3;
-    let (long, wide) = if flat { (0.35, 1.3) } else { (1.0, 1.0) };
-    let ring = |i: usize| {
-        let end = i.min(RINGS - 1 - i);
-        let side = if i < RINGS / 2 { -1.0 } else { 1.0 };
-        if end < third {
-            // the ball from its tip to where the bar meets it
-            let angle = 0.03 + 2.85 * end as f64 / (third - 1) as f64;
-            let x = side * (0.5 * bar + long + long * angle.cos());
-            [x, (wide * angle.sin()).max(0.25)]
-        } else {
-            let along = (i - third + 1) as f64 / (RINGS - 2 * third + 1) as f64;
-            [bar * (along - 0.5), 0.25]
-        }
-    };
-    let rings = (0..RINGS).map(ring);
-    rings
-        .flat_map(|[x, radius]| {
-            (0..AROUND).flat_map(move |j| {
-                let (sine, cosine) = (std::f64::consts::TAU * j as f64 / AROUND as f64).sin_cos();
-                [x, radius * cosine, radius * sine].map(|x| x as f32)
-            })
-        })
-        .collect()
-}
+// --- expression transfer
 
 fn doubles(row: &[f32]) -> Vec<f64> {
     row.iter().map(|&x| f64::from(x)).collect()
 }
-
-/// The kinds of ends differ as much on a long bar as on a short one; R14 finds aligned distances to say
-/// that the long ones "are clearly more similar", and edge lengths "more comparable" ones.
-fn compare_barbells(figure: &mut Figure, bells: &Sequence) -> Result<()> {
-    let poses: Vec<Vec<f64>> = (0..4).map(|i| doubles(bells.frame(i))).collect();
-    let edges = Edges::new(bells.topology());
-    let free = aligned(&scale_free(&poses, edges.ends()));
-    let ground = Ground::open(EDGE_LENGTHS, bells.topology(), &free)?;
-    let codes: Vec<Vec<f64>> = free.iter().map(|pose| ground.encode(pose)).collect();
-    let in_lengths = |a: usize, b: usize| {
-        let pairs = codes[a].iter().zip(&codes[b]);
-        pairs.map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
-    };
-    // scaled to the same root mean square distance from the middle, as Procrustes analysis does
-    let procrustes: Vec<Vec<f64>> = poses
-        .iter()
-        .map(|pose| {
-            let size = pose.iter().map(|x| x * x).sum::<f64>().sqrt();
-            pose.iter().map(|x| x / size).collect()
-        })
-        .collect();
-    let by_rms = |a: usize, b: usize| aligned_rms(&procrustes[a], &procrustes[b]);
-    let ratio = |distance: &dyn Fn(usize, usize) -> f64| distance(1, 3) / distance(0, 2);
-    let (rms, lengths) = (ratio(&by_rms), ratio(&in_lengths));
-    let row = |name: &str, distance: &dyn Fn(usize, usize) -> f64, ratio: f64| {
-        vec![
-            name.to_string(),
-            format!("{:.4}", distance(0, 2)),
-            format!("{:.4}", distance(1, 3)),
-            format!("{ratio:.2}"),
-        ]
-    };
-    println!("barbells with round and with flat ends, size taken off (R14, Fig. 7)");
-    table(
-        &[
-            "distance",
-            "long - long",
-            "short - short",
-            "short over long",
-        ],
-        &[
-            row("aligned RMS", &by_rms, rms),
-            row("edge lengths", &in_lengths, lengths),
-        ],
-    );
-    figure.goal(
-        "by aligned RMS the long ones are the more similar pair",
-        rms > 1.0,
-    );
-    figure.goal(
-        "by edge lengths the two distances are more comparable",
-        lengths.ln().abs() < rms.ln().abs(),
-    );
-    Ok(())
-}
-
-// --- expression transfer
 
 /// Another head: wider, lower, its chin forward.
 fn other_head(positions: &[f32]) -> Vec<f32> {
@@ -268,18 +160,11 @@ fn expressions(figure: &mut Figure, faces: &Sequence) -> Result<Scene> {
 const SIDE: usize = 400;
 const COLOURS: [[u8; 3]; 3] = [[150, 170, 200], [196, 188, 150], [160, 190, 160]];
 
-fn compose(bells: &Sequence, faces: &Transferred, view: &View, map: Scene) -> Scene {
+fn compose(faces: &Transferred, view: &View, map: Scene) -> Scene {
     let theme = Theme::light();
     let side = 0.5 * SIDE as f32;
     let row = side + 34.0;
-    let mut scene = Scene::new(map.width, 2.0 * row + 26.0 + map.height, theme.background);
-    let bell_view = View::looking(bells, [0.0, 0.2]);
-    let told = ["long, round", "short, round", "long, flat", "short, flat"];
-    let picture = |i: usize| bell_view.picture(bells.frame(i), SIDE, COLOURS[1]);
-    let barbells: Vec<(String, Arc<Image>)> =
-        (0..4).map(|i| (told[i].to_string(), picture(i))).collect();
-    scene.write("barbells", [8.0, 16.0], Anchor::Start, &theme);
-    support::row(&mut scene, [0.0, 8.0], side, &barbells, &theme);
+    let mut scene = Scene::new(map.width, row + 26.0 + map.height, theme.background);
     let mut heads = vec![
         (
             "neutral".to_string(),
@@ -301,19 +186,14 @@ fn compose(bells: &Sequence, faces: &Transferred, view: &View, map: Scene) -> Sc
         "as it should be".to_string(),
         view.picture(&faces.truth, SIDE, COLOURS[1]),
     ));
+    scene.write("expression transfer", [8.0, 16.0], Anchor::Start, &theme);
+    support::row(&mut scene, [0.0, 8.0], side, &heads, &theme);
     scene.write(
-        "expression transfer",
+        "expressions in edge lengths",
         [8.0, row + 16.0],
         Anchor::Start,
         &theme,
     );
-    support::row(&mut scene, [0.0, row + 8.0], side, &heads, &theme);
-    scene.write(
-        "expressions in edge lengths",
-        [8.0, 2.0 * row + 16.0],
-        Anchor::Start,
-        &theme,
-    );
-    scene.place(map, [0.0, 2.0 * row + 26.0]);
+    scene.place(map, [0.0, row + 26.0]);
     scene
 }

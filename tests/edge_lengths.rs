@@ -6,6 +6,7 @@ use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 
+use meshloom::mesh::FrameSource;
 use support::meshloom;
 use tempfile::tempdir;
 
@@ -185,10 +186,11 @@ fn meshes_without_inner_vertices_and_stretched_poses_are_warned_about() {
 #[test]
 fn corner_angles_that_cannot_close_and_flat_triangles_are_told_at_their_vertex() {
     let folder = tempdir().unwrap();
-    // a pyramid over a square that turns inside out between the poses: half way its sides are too short
-    let pyramid = |top: [f64; 3], wide: f64| {
-        let mut points: Vec<[f64; 3]> = [[1., 1.], [-1., 1.], [-1., -1.], [1., -1.]]
-            .map(|[x, y]| [x * wide, y, 0.0])
+    // two pyramids whose tops lean over a side of their square; beyond the flatter one the triangle there
+    // would be wider at the top than the three others together
+    let pyramid = |top: [f64; 3]| {
+        let mut points = [[1., 1.], [-1., 1.], [-1., -1.], [1., -1.]]
+            .map(|[x, y]| [x, y, 0.0])
             .to_vec();
         points.extend([top, [0.0, 0.0, -1.5]]);
         points
@@ -203,26 +205,22 @@ fn corner_angles_that_cannot_close_and_flat_triangles_are_told_at_their_vertex()
         [3, 2, 5],
         [0, 3, 5],
     ];
-    write(
-        &folder.path().join("a.obj"),
-        &pyramid([0.9, 0.9, 0.02], 1.0),
-        &triangles,
-    );
-    write(
-        &folder.path().join("b.obj"),
-        &pyramid([-0.9, -0.9, 0.02], 1.0),
-        &triangles,
-    );
-    let args = "morph a.obj b.obj -o out --method edge-lengths --frames 5 --json";
-    let object = meshloom(folder.path(), args).done().object();
-    let impossible = object["report"]["embedding"]["impossible"]
-        .as_array()
-        .unwrap();
-    if let Some(worst) = impossible.first() {
-        let told = object["warnings"].to_string();
-        assert!(told.contains("cannot close"), "{told}");
-        assert!(worst["degrees"].as_f64().unwrap() > 0.0);
+    for (name, top) in [("a", [1.5, 0.0, 1.0]), ("b", [2.0, 0.0, 0.05])] {
+        let path = folder.path().join(format!("{name}.obj"));
+        write(&path, &pyramid(top), &triangles);
     }
+    let args =
+        "morph a.obj b.obj -o out --method edge-lengths --path 1,0;-0.4,1.4 --frames 5 --json";
+    let object = meshloom(folder.path(), args).done().object();
+    let worst = &object["report"]["embedding"]["impossible"][0];
+    assert_eq!([&worst["vertex"], &worst["frame"]], [5, 5]);
+    // 92.8 degrees against 17.1 + 35.5 + 17.1
+    assert!(
+        (worst["degrees"].as_f64().unwrap() - 23.13).abs() < 0.1,
+        "{worst}"
+    );
+    let told = object["warnings"].to_string();
+    assert!(told.contains("cannot close"), "{told}");
     // a triangle of three points in a row in both poses is carried along
     let flat = |turn: f64| {
         let (mut points, triangles) = tube(5, turn, 1.0);
@@ -260,4 +258,85 @@ fn the_same_bytes_on_any_number_of_threads() {
         fs::read(folder.path().join(format!("{threads}.pc2"))).unwrap()
     };
     assert_eq!(written(1), written(2));
+}
+
+/// Two frames of a real capture, as points and triangles.
+fn real(name: &str, frames: [usize; 2]) -> Option<([Vec<[f64; 3]>; 2], Vec<[usize; 3]>)> {
+    let folder = support::real_captures()?.join(name);
+    let (world, task) = (meshloom::io::Disk, meshloom::task::Task::default());
+    let spec = meshloom::pipeline::InputSpec::new(folder);
+    let opened = meshloom::pipeline::open(&world, &spec, &task).unwrap();
+    let capture = opened.output.content.sequence(&task).unwrap();
+    let points = frames.map(|frame| {
+        let (points, _) = capture.frame(frame).as_chunks::<3>();
+        points.iter().map(|p| p.map(f64::from)).collect()
+    });
+    let triangles = capture.topology().triangles().iter();
+    Some((points, triangles.map(|t| t.map(|v| v as usize)).collect()))
+}
+
+/// The inner vertex that stands out most over the vertices around it, and where it goes when it is pushed
+/// through their middle to the other side.
+fn pushed_in(points: &[[f64; 3]], triangles: &[[usize; 3]]) -> (usize, Vec<usize>, [f64; 3]) {
+    let around = |vertex: usize| -> Vec<usize> {
+        let with = triangles.iter().filter(|t| t.contains(&vertex)).flatten();
+        let mut ring: Vec<usize> = with.copied().filter(|&v| v != vertex).collect();
+        // each twice where the ring is closed
+        ring.sort_unstable();
+        let closed = ring.chunk_by(|a, b| a == b).all(|run| run.len() == 2);
+        ring.dedup();
+        if closed { ring } else { Vec::new() }
+    };
+    let middle = |ring: &[usize]| -> [f64; 3] {
+        std::array::from_fn(|k| ring.iter().map(|&v| points[v][k]).sum::<f64>() / ring.len() as f64)
+    };
+    let height = |vertex: usize, ring: &[usize]| {
+        let middle = middle(ring);
+        (0..3)
+            .map(|k| (points[vertex][k] - middle[k]).powi(2))
+            .sum::<f64>()
+    };
+    let (vertex, ring) = (0..points.len())
+        .map(|vertex| (vertex, around(vertex)))
+        .filter(|(_, ring)| ring.len() >= 5)
+        .max_by(|a, b| height(a.0, &a.1).total_cmp(&height(b.0, &b.1)))
+        .unwrap();
+    let middle = middle(&ring);
+    let inside = std::array::from_fn(|k| 2.0 * middle[k] - points[vertex][k]);
+    (vertex, ring, inside)
+}
+
+#[test]
+fn a_jump_in_a_real_capture_is_named_and_nothing_else_is() {
+    let Some(([first, second], triangles)) = real("lowpoly-horse-gallop", [0, 1]) else {
+        return;
+    };
+    let folder = tempdir().unwrap();
+    let (vertex, ring, inside) = pushed_in(&second, &triangles);
+    let mut popped = second.clone();
+    popped[vertex] = inside;
+    for (name, points) in [("a", &first), ("b", &second), ("popped", &popped)] {
+        write(
+            &folder.path().join(format!("{name}.obj")),
+            points,
+            &triangles,
+        );
+    }
+    let morph = |to: &str| {
+        let args = format!("morph a.obj {to}.obj -o {to} --method edge-lengths --frames 13 --json");
+        meshloom(folder.path(), &args).done().object()["report"]["embedding"].clone()
+    };
+    let plain = morph("b");
+    assert_eq!(plain["jumps"].as_array().unwrap().len(), 0, "{plain}");
+    assert!(plain["within_percent"].as_f64().unwrap() >= 98.0, "{plain}");
+    let found = morph("popped");
+    let jumps = found["jumps"].as_array().unwrap();
+    assert_eq!(jumps.len(), 1, "{found}");
+    // the edge is one at the vertex or around it, counted from 1
+    for end in jumps[0]["edge"].as_array().unwrap() {
+        let end = end.as_u64().unwrap() as usize - 1;
+        assert!(end == vertex || ring.contains(&end), "{found}");
+    }
+    // what does not turn over keeps its lengths, also in the frames that are blended across
+    assert!(found["within_percent"].as_f64().unwrap() >= 98.0, "{found}");
 }

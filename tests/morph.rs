@@ -124,6 +124,25 @@ fn skeletons_keep_the_lengths_of_their_bones() {
 }
 
 #[test]
+fn a_skeleton_that_only_turns_keeps_its_angles_by_the_alignment() {
+    let folder = tempdir().unwrap();
+    let turned = legs(20.0).replace("\n0 1 0 0 0 0 ", "\n0 1 0 40 100 30 ");
+    assert_ne!(turned, legs(20.0));
+    fs::write(folder.path().join("a.bvh"), legs(20.0)).unwrap();
+    fs::write(folder.path().join("b.bvh"), turned).unwrap();
+    let args = "morph a.bvh b.bvh -o out.json --frames 5 --json";
+    let object = meshloom(folder.path(), args).done().object();
+    let alignment = &object["report"]["alignment"];
+    let worst = |which: &str| alignment[which]["joint_worst_degrees"].as_f64().unwrap();
+    // bvh files hold a few digits
+    assert!(worst("with") < 1e-3, "{alignment}");
+    assert!(worst("without") > 1.0, "{alignment}");
+    assert!(alignment["turn_degrees"].as_f64().unwrap() > 90.0);
+    let told = meshloom(folder.path(), "morph a.bvh b.bvh -o again.json --frames 5").done();
+    assert!(told.stderr.contains("angles at joints"), "{}", told.stderr);
+}
+
+#[test]
 fn what_is_no_skeleton_is_named() {
     let folder = tempdir().unwrap();
     let put = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();

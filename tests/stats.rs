@@ -4,6 +4,7 @@ mod support;
 
 use std::fs;
 
+use serde_json::Value;
 use support::capture::sheet;
 use support::{keys, meshloom};
 use tempfile::tempdir;
@@ -17,21 +18,23 @@ fn poses_have_a_mean_modes_and_a_picture() {
             "stats poses --space {space} --mean mean.obj --modes modes --plot p.svg --json"
         );
         let object = meshloom(folder.path(), &args).done().object();
-        assert_eq!(
-            keys(&object),
-            [
-                "coordinates",
-                "dimension",
-                "explained",
-                "outputs",
-                "poses",
-                "scale_free",
-                "seconds",
-                "sigmas",
-                "space",
-                "warnings",
-            ]
-        );
+        let mut known = vec![
+            "coordinates",
+            "dimension",
+            "explained",
+            "outputs",
+            "poses",
+            "scale_free",
+            "seconds",
+            "sigmas",
+            "space",
+            "warnings",
+        ];
+        if space == "edge-lengths" {
+            known.insert(5, "returned");
+            returned_well(&object);
+        }
+        assert_eq!(keys(&object), known);
         let numbers = |key: &str| object[key].as_array().unwrap().len();
         assert_eq!([numbers("coordinates"), numbers("explained")], [5, 4]);
         // the mean, three modes of nine shapes, the picture
@@ -49,6 +52,21 @@ fn poses_have_a_mean_modes_and_a_picture() {
         let same = "compare mean.obj modes/mode_2/frame_05.obj --json";
         assert_eq!(meshloom(folder.path(), same).done().object()["max"], 0.0);
     }
+}
+
+/// The mean and 27 samples are told with the way they came back from lengths, by R14's embedding near the
+/// mean.
+fn returned_well(object: &Value) {
+    let returned = object["returned"].as_array().unwrap();
+    assert_eq!(returned.len(), 28);
+    assert_eq!(returned[0]["shape"], "mean");
+    for one in returned {
+        let by = one["by"].as_str().unwrap();
+        assert!(["embedding", "layout"].contains(&by), "{one}");
+        assert!(one["edge_worst_percent"].as_f64().unwrap() >= 0.0);
+    }
+    assert_eq!(returned[0]["by"], "embedding", "{}", returned[0]);
+    assert!(returned[0]["edge_rms_percent"].as_f64().unwrap() < 0.5);
 }
 
 #[test]

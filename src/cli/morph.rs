@@ -8,15 +8,19 @@ use super::args::Part;
 use super::report;
 use super::session::{Outcome, Session};
 use crate::diag::Result;
-use crate::pipeline::{self, MorphMethod, MorphPath, MorphReport, MorphRequest, Output, Saved};
+use crate::pipeline::{
+    self, AlignmentReport, ConformalReport, EmbeddingReport, MorphMethod, MorphPath, MorphReport,
+    MorphRequest, Output, Saved,
+};
 
 /// Write the frames between poses of a mesh or a skeleton
 ///
 /// Poses follow each other in the order given; the frames at them are the poses themselves. isometric:
 /// edge lengths go linearly from one pose to the next and triangles turn as their neighbours do; exact
 /// for meshes without inner vertices. edge-lengths: edge lengths go linearly and are met, as near as a
-/// shape can; --path leads through the space of three, four or more poses. Of skeletons (.bvh, and .json lists of joints) bones go linearly
-/// in length and straight in direction.
+/// shape can; --path leads through the space of three, four or more poses. conformal: one factor a vertex
+/// scales the edges at it, between conformally equivalent poses, or from one closed mesh to the sphere. Of
+/// skeletons (.bvh, and .json lists of joints) bones go linearly in length and straight in direction.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// Meshes with the same faces, in order: files, a folder, a pattern, or one file with many frames; or
@@ -32,7 +36,7 @@ pub(super) struct Args {
     output: PathBuf,
 
     /// How shapes between the poses are found: isometric, spline (one curve through all poses in a shape
-    /// space), edge-lengths
+    /// space), edge-lengths, conformal
     #[arg(long, value_name = "METHOD", default_value = MorphMethod::default().name())]
     method: MorphMethod,
 
@@ -47,7 +51,7 @@ pub(super) struct Args {
 
     /// Where the frames lie among the poses: `circle` between four poses at the corners of a square, or a
     /// smooth curve through points: `0,0 0.5,1 1,1` in that square, else one weight a pose
-    /// [edge-lengths]
+    /// [edge-lengths, conformal]
     #[arg(long, value_name = "PATH")]
     path: Option<MorphPath>,
 
@@ -55,7 +59,7 @@ pub(super) struct Args {
     #[arg(long)]
     squared: bool,
 
-    /// Embed every Nth frame only, blend lengths and angles between [edge-lengths]
+    /// Embed every Nth frame only, blend lengths and angles between [edge-lengths, conformal]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     every: Option<u32>,
 
@@ -155,29 +159,67 @@ fn told(session: &Session, found: &MorphReport) -> String {
             pair(found.strain.mean_percent, found.strain.worst_percent),
         ),
     ];
-    if let Some(alignment) = &found.alignment {
-        let degrees = |value: f64| format!("{} degrees", report::number(value));
-        rows.push(("rigid turn taken off", degrees(alignment.turn_degrees)));
-        rows.push((
-            "normals from slerp",
+    rows.extend(found.alignment.iter().flat_map(alignment_rows));
+    rows.extend(found.conformal.iter().map(conformal_row));
+    rows.extend(found.embedding.iter().flat_map(embedding_rows));
+    report::table(session.style, found.method, &rows)
+}
+
+type Row = (&'static str, String);
+
+/// What taking off the rigid motion did: to the angles at joints of a skeleton, to normals and edges of a
+/// mesh.
+fn alignment_rows(alignment: &AlignmentReport) -> Vec<Row> {
+    let degrees = |value: f64| format!("{} degrees", report::number(value));
+    let (with, without) = (alignment.with, alignment.without);
+    let mut rows = vec![("rigid turn taken off", degrees(alignment.turn_degrees))];
+    match (with.joint_mean_degrees, without.joint_mean_degrees) {
+        (Some(with), Some(without)) => rows.push((
+            "angles at joints",
             format!(
-                "{} on average, {} without that",
-                degrees(alignment.with.normal_mean_degrees),
-                degrees(alignment.without.normal_mean_degrees),
+                "half way {} off on average, {} without that",
+                degrees(with),
+                degrees(without)
             ),
-        ));
-        rows.push((
-            "edges half way",
-            format!(
-                "{} on average, {} without that",
-                report::percent(alignment.with.edge_mean_percent),
-                report::percent(alignment.without.edge_mean_percent),
+        )),
+        _ => rows.extend([
+            (
+                "normals from slerp",
+                format!(
+                    "{} on average, {} without that",
+                    degrees(with.normal_mean_degrees),
+                    degrees(without.normal_mean_degrees),
+                ),
             ),
-        ));
+            (
+                "edges half way",
+                format!(
+                    "{} on average, {} without that",
+                    report::percent(with.edge_mean_percent),
+                    report::percent(without.edge_mean_percent),
+                ),
+            ),
+        ]),
     }
-    if let Some(embedding) = &found.embedding {
-        let [half, _, most, _] = embedding.percentiles;
-        rows.push((
+    rows
+}
+
+fn conformal_row(conformal: &ConformalReport) -> Row {
+    let [least, most] = conformal.factors.map(report::number);
+    let place = if conformal.sphere {
+        " to the sphere"
+    } else {
+        ""
+    };
+    let off = report::percent(conformal.residual_percent);
+    let told = format!("{least} to {most}{place}, lengths explained to {off}");
+    ("conformal factors", told)
+}
+
+fn embedding_rows(embedding: &EmbeddingReport) -> [Row; 2] {
+    let [half, _, most, _] = embedding.percentiles;
+    [
+        (
             "edges within 1 %",
             format!(
                 "{} in the worst frame (half within {}, 98 % within {})",
@@ -185,14 +227,13 @@ fn told(session: &Session, found: &MorphReport) -> String {
                 report::percent(half),
                 report::percent(most)
             ),
-        ));
-        rows.push((
+        ),
+        (
             "closed walks",
             format!(
                 "{}, residual at most {:.2e} (frame {})",
                 embedding.walks, embedding.residual, embedding.residual_frame
             ),
-        ));
-    }
-    report::table(session.style, found.method, &rows)
+        ),
+    ]
 }

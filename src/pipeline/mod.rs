@@ -44,10 +44,10 @@ pub use key_path::{KeyPath, key_map, key_path, plot_motion};
 pub use loom::{check_loom_output, is_loom, open_loom, save_loom};
 pub use memory::{Made, Memory, Remembered};
 pub use morph::{
-    AlignmentEffect, AlignmentReport, EdgeReport, EmbeddingReport, ImpossibleVertex, JumpReport,
-    MissedEdge, Morph, MorphMethod, MorphPath, MorphReport, MorphRequest, SkeletonMorphed, Strain,
-    is_skeleton, morph, morph_frames, morph_skeletons, open_skeletons, plan_skeletons,
-    save_skeletons,
+    AlignmentEffect, AlignmentReport, ConformalReport, EdgeReport, EmbeddingReport,
+    ImpossibleVertex, JumpReport, MissedEdge, Morph, MorphMethod, MorphPath, MorphReport,
+    MorphRequest, SkeletonMorphed, Strain, is_skeleton, morph, morph_frames, morph_skeletons,
+    open_skeletons, plan_skeletons, save_skeletons,
 };
 pub use names::pose_names;
 pub use open::{Capture, Content, Origin, open};
@@ -59,7 +59,8 @@ pub use separate::separate;
 pub use sheet::contact_sheet;
 pub use spaces::{SpaceReport, best_space, compare_spaces, why as why_best_space};
 pub use statistics::{
-    SAMPLES, Statistics, StatisticsReport, StatisticsRequest, add_difference, statistics,
+    Found, ReturnedReport, SAMPLES, Statistics, StatisticsReport, StatisticsRequest,
+    add_difference, statistics,
 };
 pub use tangents::{Side, Tangents};
 pub use transfer::open_examples;

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use rayon::prelude::*;
 use serde::Serialize;
 
 use super::value::Shape;
@@ -11,7 +12,9 @@ use crate::plot::{
     Group, MapNames, PoseSpace, Scatter, Scene, Spectrum, Theme, Tint, scatter, spectrum,
 };
 use crate::space::SPACES;
-use crate::statistics::{EDGE_LENGTHS, Ground, Population, aligned, scale_free};
+use crate::statistics::{
+    ByLengths, EDGE_LENGTHS, Ground, Population, Returned, Way, aligned, scale_free,
+};
 use crate::task::Task;
 
 /// What is asked of statistics.
@@ -58,6 +61,39 @@ pub struct StatisticsReport {
     pub sigmas: Vec<f64>,
     /// Where each pose lies along each mode, from the mean.
     pub coordinates: Vec<Vec<f64>>,
+}
+
+/// How edge lengths became a shape again, as the command line's JSON has it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ReturnedReport {
+    /// Which shape: `mean`, or `mode 1, -2 sigma`.
+    pub shape: String,
+    /// `embedding` (R14 §2), or `layout` where triangles laid out as they fit do better.
+    pub by: &'static str,
+    /// Root mean square error of the lengths over their mean, in percent.
+    pub edge_rms_percent: f64,
+    /// The largest error of an edge, in percent of its length.
+    pub edge_worst_percent: f64,
+}
+
+impl ReturnedReport {
+    fn new(shape: String, by: ByLengths) -> Self {
+        ReturnedReport {
+            shape,
+            by: by.way.name(),
+            edge_rms_percent: by.rms_percent,
+            edge_worst_percent: by.worst_percent,
+        }
+    }
+}
+
+/// Shapes found from their coordinates.
+#[derive(Debug, Clone)]
+pub struct Found<T> {
+    /// The shape or shapes.
+    pub output: T,
+    /// How lengths became them; none in a shape space.
+    pub returned: Vec<ReturnedReport>,
 }
 
 /// Samples along a mode: from -2 to 2 standard deviations in steps of a half.
@@ -124,7 +160,8 @@ impl Statistics {
     /// Bytes that it holds.
     pub(super) fn bytes(&self) -> usize {
         let d = self.ground.dimension();
-        8 * (d * (self.modes() + 1) + self.poses.len() * 3 * self.topology.vertices())
+        // in edge lengths the poses are held with their dihedral angles
+        8 * (d * (self.modes() + 1) + self.poses.len() * (6 * self.topology.vertices() + 2 * d))
     }
 
     /// What was found.
@@ -146,15 +183,15 @@ impl Statistics {
     ///
     /// # Errors
     /// None that finite poses can cause.
-    pub fn mean(&self) -> Result<Warned<Shape>> {
-        self.shape(&self.population.along(0, 0.0))
+    pub fn mean(&self) -> Result<Warned<Found<Shape>>> {
+        self.shape("mean".to_string(), &self.population.along(0, 0.0))
     }
 
     /// The shape `sigmas` standard deviations along a mode, counted from 1.
     ///
     /// # Errors
     /// There is no such mode.
-    pub fn sample(&self, mode: usize, sigmas: f64) -> Result<Warned<Shape>> {
+    pub fn sample(&self, mode: usize, sigmas: f64) -> Result<Warned<Found<Shape>>> {
         if mode == 0 || mode > self.modes() {
             return Diagnostic::error(format!(
                 "there is no mode {mode}: {} poses",
@@ -163,46 +200,57 @@ impl Statistics {
             .hint(format!("choose within 1:{}", self.modes()))
             .err();
         }
-        self.shape(&self.population.along(mode - 1, sigmas))
+        let name = format!("mode {mode}, {sigmas} sigma");
+        self.shape(name, &self.population.along(mode - 1, sigmas))
     }
 
     /// [`SAMPLES`] shapes along a mode, counted from 1, from -2 to 2 standard deviations.
     ///
     /// # Errors
     /// There is no such mode; cancellation.
-    pub fn along(&self, mode: usize, task: &Task) -> Result<Warned<Sequence>> {
-        let (mut positions, mut warnings) = (Vec::new(), Vec::new());
-        for step in 0..SAMPLES {
+    pub fn along(&self, mode: usize, task: &Task) -> Result<Warned<Found<Sequence>>> {
+        let sampled = |step: usize| {
             task.check()?;
-            let sigmas = step as f64 * 4.0 / (SAMPLES - 1) as f64 - 2.0;
-            let mut told = Vec::new();
-            positions.extend(self.sample(mode, sigmas)?.unpack(&mut told).positions);
-            warnings.extend(told.into_iter().map(|warning| Diagnostic {
-                message: format!("{sigmas} sigma along mode {mode}: {}", warning.message),
-                ..warning
-            }));
+            self.sample(mode, step as f64 * 4.0 / (SAMPLES - 1) as f64 - 2.0)
+        };
+        let samples: Result<Vec<_>> = (0..SAMPLES).into_par_iter().map(sampled).collect();
+        let (mut positions, mut returned) = (Vec::new(), Vec::new());
+        let mut warnings = Vec::new();
+        for sample in samples? {
+            let found = sample.unpack(&mut warnings);
+            positions.extend(found.output.positions);
+            returned.extend(found.returned);
         }
         Ok(Warned {
-            output: Sequence::new(Arc::clone(&self.topology), positions, None),
+            output: Found {
+                output: Sequence::new(Arc::clone(&self.topology), positions, None),
+                returned,
+            },
             warnings,
         })
     }
 
-    fn shape(&self, code: &[f64]) -> Result<Warned<Shape>> {
-        // lengths start from the pose whose own are nearest
-        let distance = |pose: &Vec<f64>| -> f64 {
-            let pairs = self.ground.encode(pose).into_iter().zip(code);
-            pairs.map(|(a, b)| (a - b) * (a - b)).sum()
-        };
-        let nearest = self
-            .poses
-            .iter()
-            .min_by(|a, b| distance(a).total_cmp(&distance(b)));
-        let near = nearest.map_or(&[][..], Vec::as_slice);
-        let positions = self.ground.decode(code, near)?;
+    /// The shape `along` the first modes from the mean.
+    fn shape(&self, name: String, along: &[f64]) -> Result<Warned<Found<Shape>>> {
+        let code = self.population.at(along);
+        let found = self.ground.decode(&code, &self.population.weights(along))?;
+        let told = told_of(&self.ground, &code, &found);
         Ok(Warned {
-            output: shape(&self.topology, &positions),
-            warnings: broken(&self.ground, code).into_iter().collect(),
+            output: Found {
+                output: shape(&self.topology, &found.positions),
+                returned: found
+                    .by
+                    .map(|by| ReturnedReport::new(name.clone(), by))
+                    .into_iter()
+                    .collect(),
+            },
+            warnings: told
+                .map(|warning| Diagnostic {
+                    message: format!("{name}: {}", warning.message),
+                    ..warning
+                })
+                .into_iter()
+                .collect(),
         })
     }
 
@@ -223,7 +271,8 @@ impl Statistics {
     /// None that finite places can cause.
     pub fn shape_of(&self, place: [f64; 2]) -> Result<Warned<Shape>> {
         let modes = self.modes().min(2);
-        self.shape(&self.population.at(&place[..modes]))
+        let found = self.shape("the shape there".to_string(), &place[..modes])?;
+        Ok(found.map(|found| found.output))
     }
 
     /// Where a pose (from 0) lies in the plane of the first two modes.
@@ -354,21 +403,30 @@ pub fn add_difference(shapes: &Sequence, space: &str) -> Result<Warned<Shape>> {
         &[poses[0].clone(), pair[0].clone(), pair[1].clone()],
     )?;
     let code = ground.moved(&poses[0], &pair[0], &pair[1]);
-    let positions = ground.decode(&code, &poses[0])?;
+    let found = ground.decode(&code, &[1.0, -1.0, 1.0])?;
     Ok(Warned {
-        output: shape(topology, &positions),
-        warnings: broken(&ground, &code).into_iter().collect(),
+        warnings: told_of(&ground, &code, &found).into_iter().collect(),
+        output: shape(topology, &found.positions),
     })
 }
 
-/// What is said of lengths that are those of no triangle.
-fn broken(ground: &Ground, code: &[f64]) -> Option<Diagnostic> {
-    let face = ground.broken(code)?;
-    Some(
-        Diagnostic::warning("edge lengths that no triangle has: it becomes a line")
-            .at_face(face + 1)
-            .hint("go less far from the mean, or use a shape space"),
-    )
+/// A shape laid out with edges off by more than this (root mean square, percent) is told.
+const NEAR: f64 = 0.5;
+
+/// What is said of lengths that are those of no triangle, or that were not embedded.
+fn told_of(ground: &Ground, code: &[f64], found: &Returned) -> Option<Diagnostic> {
+    let by = found.by.filter(|by| by.way == Way::Layout)?;
+    if let Some(face) = ground.broken(code) {
+        let told = Diagnostic::warning("edge lengths that no triangle has: it becomes a line");
+        let hint = "go less far from the mean, or use a shape space";
+        return Some(told.at_face(face + 1).hint(hint));
+    }
+    (by.rms_percent > NEAR).then(|| {
+        Diagnostic::warning(format!(
+            "its triangles were laid out as they fit, edges being off by {:.2} % (root mean square): no embedding was found that meets them better",
+            by.rms_percent
+        ))
+    })
 }
 
 fn shape(topology: &Arc<Topology>, positions: &[f64]) -> Shape {
@@ -422,7 +480,7 @@ mod tests {
             // three poses lie in a plane; f32 positions of a cactus about a metre high
             assert!(pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max) < 1e-5);
         }
-        let mean = found.mean().unwrap().output;
+        let mean = found.mean().unwrap().output.output;
         assert_eq!(
             found.shape_of([0.0; 2]).unwrap().output.positions,
             mean.positions
@@ -433,8 +491,8 @@ mod tests {
     fn modes_are_counted_from_one_and_sampled_about_the_mean() {
         let found = found("vertices");
         assert_eq!(found.modes(), 2);
-        let line = found.along(1, &Task::default()).unwrap().output;
-        let mean = found.mean().unwrap().output;
+        let line = found.along(1, &Task::default()).unwrap().output.output;
+        let mean = found.mean().unwrap().output.output;
         assert_eq!(line.frames(), SAMPLES);
         let apart = line.frame(4).iter().zip(&mean.positions);
         assert!(apart.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max) == 0.0);

@@ -23,6 +23,7 @@ mod refine;
 mod registry;
 mod scales;
 mod sequence;
+mod straight;
 mod vertices;
 
 use std::fmt;
@@ -38,6 +39,7 @@ pub use patch_lri::{CoarsePatchLri, PatchLri};
 pub use patching::Fine;
 pub use registry::{SPACES, SpaceKind, Spaces, State};
 pub use sequence::{LARGE_TURN, encode_frames, follow_frames};
+pub use straight::StraightPath;
 pub use vertices::Vertices;
 
 /// What may happen to a shape without a change of its coordinates (the stored position and

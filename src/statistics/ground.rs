@@ -2,9 +2,8 @@
 
 use std::sync::Arc;
 
-use super::length;
-use crate::inbetween::Layout;
-use crate::inbetween::isometric::Connectivity;
+use super::lengths::{Lengths, Way};
+use crate::inbetween::edge_lengths::EdgeFit;
 use crate::mesh::Topology;
 use crate::space::{ShapeSpace, SpaceError, Spaces};
 
@@ -19,7 +18,41 @@ pub struct Ground {
 
 enum Kind {
     Space(Arc<dyn ShapeSpace>),
-    Lengths(Connectivity),
+    Lengths(Box<Lengths>),
+}
+
+/// A shape that came back from its coordinates.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Returned {
+    /// 3V positions.
+    pub positions: Vec<f64>,
+    /// How lengths became it; none in a shape space.
+    pub by: Option<ByLengths>,
+}
+
+/// How edge lengths became a shape, and how well.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ByLengths {
+    /// How.
+    pub way: Way,
+    /// Root mean square error of the lengths over their mean, in percent.
+    pub rms_percent: f64,
+    /// The largest error of an edge in percent of its length.
+    pub worst_percent: f64,
+}
+
+impl Returned {
+    pub(super) fn new(positions: Vec<f64>, way: Way, fit: &EdgeFit) -> Self {
+        let by = ByLengths {
+            way,
+            rms_percent: fit.rms_percent,
+            worst_percent: fit.max_percent(),
+        };
+        Returned {
+            positions,
+            by: Some(by),
+        }
+    }
 }
 
 impl Ground {
@@ -38,7 +71,7 @@ impl Ground {
     ) -> Result<Self, SpaceError> {
         let vertices = topology.vertices();
         let kind = if name == EDGE_LENGTHS {
-            Kind::Lengths(Connectivity::new(topology, &poses[0])?)
+            Kind::Lengths(Box::new(Lengths::new(topology, poses)?))
         } else {
             let poses: Vec<&[f64]> = poses.iter().map(Vec::as_slice).collect();
             Kind::Space(Spaces::new(Arc::clone(topology), poses[0]).open(name, &poses)?)
@@ -50,7 +83,7 @@ impl Ground {
     pub fn dimension(&self) -> usize {
         match &self.kind {
             Kind::Space(space) => space.dimension(),
-            Kind::Lengths(connectivity) => connectivity.edges().len(),
+            Kind::Lengths(lengths) => lengths.dimension(),
         }
     }
 
@@ -62,26 +95,30 @@ impl Ground {
                 space.encode(positions, &mut code);
                 code
             }
-            Kind::Lengths(connectivity) => {
-                let edges = connectivity.edges().iter();
-                edges.map(|&edge| length(positions, edge)).collect()
-            }
+            Kind::Lengths(lengths) => lengths.of(positions),
         }
     }
 
-    /// The shape of coordinates. Lengths do not say which of several shapes: theirs is the one that is
-    /// reached from `near`, which lies where that lies ([`Layout`]).
+    /// The shape of coordinates. Lengths do not say which of several shapes: theirs is the one whose
+    /// dihedral angles come nearest the sum, with these weights, of those of the poses the ground was
+    /// opened with (R14 §2.1: the average of the input dihedrals); it lies on the same sum of the poses.
     ///
     /// # Errors
-    /// `near` has sizes beyond double precision.
-    pub fn decode(&self, code: &[f64], near: &[f64]) -> Result<Vec<f64>, SpaceError> {
+    /// A pose has sizes beyond double precision.
+    ///
+    /// # Panics
+    /// There is not one weight a pose.
+    pub fn decode(&self, code: &[f64], weights: &[f64]) -> Result<Returned, SpaceError> {
         match &self.kind {
             Kind::Space(space) => {
                 let mut positions = vec![0.0; 3 * self.vertices];
                 space.decode(code, &mut positions);
-                Ok(positions)
+                Ok(Returned {
+                    positions,
+                    by: None,
+                })
             }
-            Kind::Lengths(connectivity) => Ok(Layout::new(connectivity, near)?.laid_out(code)),
+            Kind::Lengths(lengths) => lengths.shape(code, weights),
         }
     }
 
@@ -97,16 +134,9 @@ impl Ground {
 
     /// The first triangle, from 0, whose lengths are those of no triangle; never in a shape space.
     pub fn broken(&self, code: &[f64]) -> Option<usize> {
-        let Kind::Lengths(connectivity) = &self.kind else {
-            return None;
-        };
-        connectivity.sides().position(|sides| {
-            let lengths = sides.map(|side| side.map_or(0.0, |side| code[side]));
-            let (sum, longest) = lengths
-                .iter()
-                .fold((0.0, 0.0_f64), |(sum, most), &x| (sum + x, most.max(x)));
-            // a flat triangle may break it by rounding
-            2.0 * longest > sum * (1.0 + 1e-9) || lengths.iter().any(|&x| x < 0.0)
-        })
+        match &self.kind {
+            Kind::Space(_) => None,
+            Kind::Lengths(lengths) => lengths.broken(code),
+        }
     }
 }

@@ -13,6 +13,8 @@ pub struct Population {
     /// Singular values of the modes over the root of n - 1.
     sigmas: Vec<f64>,
     explained: Vec<f64>,
+    /// n.
+    shapes: usize,
 }
 
 impl Population {
@@ -38,6 +40,7 @@ impl Population {
             sigmas: singular.clone().map(|value| value / free.sqrt()).collect(),
             explained: singular.map(|value| value * value / all).collect(),
             mean: pca.mean().to_vec(),
+            shapes: shapes.len(),
             basis,
         })
     }
@@ -68,6 +71,23 @@ impl Population {
         &self.basis.coordinates[index * modes..(index + 1) * modes]
     }
 
+    /// The weights of the shapes in the point that lies `along` the first modes from the mean: it is the sum
+    /// of their coordinates with these. They sum to 1.
+    pub fn weights(&self, along: &[f64]) -> Vec<f64> {
+        let modes = self.modes();
+        let rows = self.basis.coordinates.chunks_exact(modes.max(1));
+        let count = self.shapes as f64;
+        let mut weights = vec![1.0 / count; self.shapes];
+        for (weight, row) in weights.iter_mut().zip(rows) {
+            // sigma^2 (n - 1) is the sum of the mode's squared coordinates
+            let each = row.iter().zip(along).zip(&self.sigmas);
+            *weight += each
+                .map(|((x, amount), sigma)| x * amount / (sigma * sigma * (count - 1.0).max(1.0)))
+                .sum::<f64>();
+        }
+        weights
+    }
+
     /// The coordinates in the space of the point that lies `along` the first modes from the mean.
     pub fn at(&self, along: &[f64]) -> Vec<f64> {
         let mut code = self.mean.clone();
@@ -80,14 +100,14 @@ impl Population {
         code
     }
 
-    /// The coordinates of the point `sigmas` standard deviations along one mode, counted from 0; of the
-    /// mean where there is no such mode.
+    /// The point `sigmas` standard deviations along one mode, counted from 0, as [`Population::at`] takes
+    /// it; the mean where there is no such mode.
     pub fn along(&self, mode: usize, sigmas: f64) -> Vec<f64> {
         let mut along = vec![0.0; self.modes()];
         if let Some(amount) = along.get_mut(mode) {
             *amount = sigmas * self.sigmas[mode];
         }
-        self.at(&along)
+        along
     }
 }
 

@@ -13,7 +13,7 @@ use super::shape::point;
 use crate::math::block_sparse::BlockPattern;
 use crate::math::sparse::Factor;
 
-/// Steps at most; lengths of a real shape need two or three.
+/// Steps at most; lengths of a real shape need three or four.
 const STEPS: usize = 20;
 
 /// Edges shorter than this part of the mean count as this long where errors are divided by lengths.
@@ -24,7 +24,12 @@ const MET: f64 = 1e-6;
 
 /// This many steps in a row that each gain less than this part of what is left end the iteration.
 const IDLE: usize = 3;
-const GAIN: f64 = 0.02;
+const GAIN: f64 = 0.05;
+
+/// Below this relative error (root mean square) a step that gains less than this part ends it: lengths that
+/// a shape has are by then met ten times better a step, and others cannot be met much better.
+const NEAR: f64 = 2e-5;
+const SLOW: f64 = 0.75;
 
 /// Holds what edges leave free altogether (motions of a whole part), in parts of the mean diagonal.
 const GAUGE: f64 = 1e-12;
@@ -69,17 +74,19 @@ impl Finisher {
                 .as_ref()
                 .map(|x| self::cost(edges, lengths, &weights, x));
             let (Some(trial), Some(found)) = (trial, found.filter(|&found| found < cost)) else {
-                damping *= if refused { 10.0 } else { 100.0 };
+                damping *= 10.0;
                 refused = true;
                 continue;
             };
             let gain = (cost - found) / cost;
             positions.copy_from_slice(&trial);
             cost = found;
-            damping = (damping * if refused { 0.5 } else { 0.1 }).max(DAMPING[1]);
+            // a step that was refused before is not tried again at once
+            damping = (damping * if refused { 1.0 } else { 0.1 }).max(DAMPING[1]);
             refused = false;
             idle = if gain < GAIN { idle + 1 } else { 0 };
-            if idle == IDLE {
+            let near = NEAR * NEAR * edges.len() as f64;
+            if idle == IDLE || (cost < near && gain < SLOW) {
                 break;
             }
         }

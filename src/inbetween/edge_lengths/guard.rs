@@ -8,12 +8,13 @@
 //! before, the step is then taken again, bisected until no part of it is suspect. If that leads to another
 //! shape than the one found, the frame was on another branch: the sequence goes on along the new one until
 //! the two agree. If they still differ at a pose (a crease that must turn over somewhere), frames around
-//! the jump are blended in lengths and dihedral angles instead.
+//! the jump are blended instead ([`Mending::Blended`]), in lengths and dihedral angles or between the shapes
+//! of both branches, whichever misses the lengths less.
 
 use nalgebra::Vector3;
 
 use super::sequence::{Follower, pose_of};
-use super::{Embedded, Embedding, Target};
+use super::{Embedded, Embedding, Target, wrapped};
 use crate::mesh::rigid_align::mean;
 use crate::space::SpaceError;
 
@@ -37,6 +38,9 @@ const BISECTIONS: u32 = 3;
 /// Frames on either side of a jump that are blended where it cannot be avoided.
 const AROUND: usize = 3;
 
+/// A vertex turns over with a jump where two branches have it farther apart than this part of the mean edge.
+const APART: f64 = 0.1;
+
 /// What was done about a jump.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mending {
@@ -45,8 +49,8 @@ pub enum Mending {
         /// How many frames.
         frames: usize,
     },
-    /// No path leads around it: this many frames around it have lengths and dihedral angles blended between
-    /// the frames before and after.
+    /// No path leads around it: this many frames around it are blended, in lengths and dihedral angles
+    /// between the frames before and after, or between the shapes that both branches have there.
     Blended {
         /// How many frames.
         frames: usize,
@@ -67,7 +71,7 @@ pub struct Repair {
 }
 
 /// The target at a row of weights.
-pub(super) type Blend<'a> = dyn Fn(&[f64]) -> Target + 'a;
+pub(super) type Aim<'a> = dyn Fn(&[f64]) -> Target + 'a;
 
 /// Shapes evenly between two, in lengths and dihedral angles.
 pub(super) type Fill<'a> =
@@ -83,7 +87,7 @@ struct Jump {
 /// Finds and mends jumps in frames embedded at these weights.
 pub(super) fn repair(
     embedding: &Embedding,
-    blend: &Blend,
+    blend: &Aim,
     weights: &[Vec<f64>],
     frames: &mut [Embedded],
     fill: &Fill,
@@ -138,7 +142,7 @@ enum Path {
 
 struct Guard<'a> {
     embedding: &'a Embedding,
-    blend: &'a Blend<'a>,
+    blend: &'a Aim<'a>,
     weights: &'a [Vec<f64>],
 }
 
@@ -212,7 +216,9 @@ impl Guard<'_> {
         Some(found)
     }
 
-    /// Blends the frames around a jump that no path avoids; poses stay.
+    /// Blends the frames around a jump that no path avoids; poses stay. Of two ways that with the smaller
+    /// edge errors is taken: lengths and dihedral angles blended between the frames before and after, or
+    /// both branches followed to each frame and their shapes blended, which moves only what turns over.
     fn smooth(
         &self,
         frame: usize,
@@ -227,18 +233,73 @@ impl Guard<'_> {
         if last - first < 2 {
             return Ok((Some(Mending::Blended { frames: 0 }), frame + 1));
         }
-        let made = fill(
-            &frames[first].positions,
-            &frames[last].positions,
-            last - first - 1,
-        )?;
-        for (at, positions) in (first + 1..last).zip(made) {
-            frames[at] = self.measured(at, positions, &frames[at]);
-        }
-        let mending = Mending::Blended {
-            frames: last - first - 1,
+        let count = last - first - 1;
+        let [from, to] = [first, last].map(|at| &frames[at].positions[..]);
+        let filled = fill(from, to, count)?;
+        let ways = [Some(filled), self.branches(first, last, frames)];
+        let measured = ways.into_iter().flatten().map(|made| {
+            let each = (first + 1..last).zip(made);
+            each.map(|(at, positions)| self.measured(at, positions, &frames[at]))
+                .collect()
+        });
+        let worst = |way: &Vec<Embedded>| {
+            let each = way.iter().map(|found| found.report.edges.rms_percent);
+            each.fold(0.0, f64::max)
         };
-        Ok((Some(mending), last + 1))
+        let best = measured.min_by(|a, b| worst(a).total_cmp(&worst(b)));
+        if let Some(best) = best {
+            frames[first + 1..last].clone_from_slice(&best);
+        }
+        Ok((Some(Mending::Blended { frames: count }), last + 1))
+    }
+
+    /// The shapes between two frames, each from the branches of both, blended; none where one cannot be
+    /// followed.
+    fn branches(&self, first: usize, last: usize, frames: &[Embedded]) -> Option<Vec<Vec<f64>>> {
+        let followed = |from: usize, way: &mut dyn Iterator<Item = usize>| {
+            let start = (self.blend)(&self.weights[from]);
+            let mut follower = Follower::from(self.embedding, &frames[from], &start);
+            let each = way.map(|at| follower.next(&(self.blend)(&self.weights[at])));
+            let found: Result<Vec<Embedded>, _> = each.collect();
+            found.ok()
+        };
+        let ahead = followed(first, &mut (first + 1..last))?;
+        let back = followed(last, &mut (first + 1..last).rev())?;
+        let pairs = ahead.iter().zip(back.iter().rev()).enumerate();
+        let blended = pairs.map(|(i, (one, two))| {
+            let t = (i + 1) as f64 / (last - first) as f64;
+            let pairs = one.positions.iter().zip(&two.positions);
+            let mut positions: Vec<f64> = pairs.map(|(a, b)| a + t * (b - a)).collect();
+            self.keep_lengths(first + 1 + i, [one, two], &mut positions);
+            positions
+        });
+        Some(blended.collect())
+    }
+
+    /// Gives a blend of two branches the lengths of its frame, but for edges at vertices where the two
+    /// differ: no shape on the way between has those.
+    fn keep_lengths(&self, at: usize, [one, two]: [&Embedded; 2], positions: &mut [f64]) {
+        let edges = self.embedding.edges();
+        let mut lengths = (self.blend)(&self.weights[at]).lengths;
+        let mean = lengths.iter().sum::<f64>() / lengths.len().max(1) as f64;
+        let places = one
+            .positions
+            .chunks_exact(3)
+            .zip(two.positions.chunks_exact(3));
+        let differ: Vec<bool> = places
+            .map(|(a, b)| {
+                let apart = Vector3::from_column_slice(a) - Vector3::from_column_slice(b);
+                apart.norm() > APART * mean
+            })
+            .collect();
+        let blended = self.embedding.lengths(positions);
+        for ((length, own), ends) in lengths.iter_mut().zip(blended).zip(edges) {
+            if ends.iter().any(|&vertex| differ[vertex as usize]) {
+                *length = own;
+            }
+        }
+        let finisher = &self.embedding.finisher;
+        finisher.finish(edges, &lengths, positions, &mut None);
     }
 
     /// A shape that was not embedded, measured against the lengths of its frame.
@@ -264,14 +325,23 @@ fn difference(a: &[f64], b: &[f64]) -> Jump {
         change: 0.0,
     };
     for (hinge, (a, b)) in a.iter().zip(b).enumerate() {
-        if (b - a).abs() > largest.change.abs() {
-            largest = Jump {
-                hinge,
-                change: b - a,
-            };
+        let change = wrapped(b - a);
+        if change.abs() > largest.change.abs() {
+            largest = Jump { hinge, change };
         }
     }
     largest
+}
+
+/// Whether two shapes with the same lengths are the same: no angle that can be seen differs.
+pub(super) fn same(embedding: &Embedding, one: &Embedded, two: &Embedded) -> bool {
+    let seen = VISIBLE * radius(&one.positions);
+    let lengths = embedding.lengths(&two.positions);
+    let mut pairs = one.dihedrals.iter().zip(&two.dihedrals).enumerate();
+    pairs.all(|(hinge, (a, b))| {
+        let change = wrapped(b - a).abs();
+        change < FLIP || change * embedding.lever(hinge, &lengths) <= seen
+    })
 }
 
 /// What makes the step between two frames suspect, each given with its target.
@@ -284,7 +354,9 @@ fn suspect(
     let seen = VISIBLE * radius(&before.0.positions);
     for hinge in 0..before.0.dihedrals.len() {
         let (old, new) = (before.0.dihedrals[hinge], after.0.dihedrals[hinge]);
-        let change = (new - old) - (after.1.dihedrals[hinge] - before.1.dihedrals[hinge]);
+        let expected = after.1.dihedrals[hinge] - before.1.dihedrals[hinge];
+        let change = wrapped(new - old - expected);
+        let (old, new) = (wrapped(old), wrapped(new));
         let flipped = old * new < 0.0 && old.abs().min(new.abs()) > 0.5 * FLIP;
         let limit = if flipped { FLIP } else { JUMP };
         let larger = |worst: Jump| change.abs() > worst.change.abs();
@@ -311,7 +383,7 @@ fn radius(positions: &[f64]) -> f64 {
 mod tests {
     use super::super::tests::icosahedron;
     use super::*;
-    use crate::inbetween::edge_lengths::{KeyShapes, Memory};
+    use crate::inbetween::edge_lengths::{Blend, KeyShapes, Memory};
 
     /// The icosahedron with its first vertex pushed inside: the same lengths (R14, Fig. 1).
     fn dented(pose: &[f64]) -> Vec<f64> {
@@ -346,7 +418,7 @@ mod tests {
         let mut follower = Follower::new(&embedding);
         let frames = weights
             .iter()
-            .map(|w| follower.next(&keys.blend(w, false)).unwrap());
+            .map(|w| follower.next(&keys.blend(w, Blend::Lengths)).unwrap());
         Case {
             frames: frames.collect(),
             dent: embedding.dihedrals(&dented(&pose)),
@@ -359,7 +431,7 @@ mod tests {
     impl Case {
         /// The embedding at a frame's lengths that has the vertex inside.
         fn popped(&self, frame: usize) -> Embedded {
-            let mut target = self.keys.blend(&self.weights[frame], false);
+            let mut target = self.keys.blend(&self.weights[frame], Blend::Lengths);
             target.dihedrals = self.dent.clone();
             self.embedding
                 .embed(&target, &mut Memory::default())
@@ -367,7 +439,7 @@ mod tests {
         }
 
         fn mend(&self, frames: &mut [Embedded]) -> Vec<Repair> {
-            let blend = |weights: &[f64]| self.keys.blend(weights, false);
+            let blend = |weights: &[f64]| self.keys.blend(weights, Blend::Lengths);
             let fill = |from: &[f64], to: &[f64], count: usize| {
                 let t = |i: usize| (i + 1) as f64 / (count + 1) as f64;
                 let row = |i| {

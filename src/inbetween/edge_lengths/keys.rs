@@ -6,6 +6,33 @@ use super::{Embedding, Target, near_branch};
 use crate::math::rotation::{exp, log};
 use crate::mesh::rigid_align::{mean, rigid};
 
+/// What of the lengths of edges is summed between poses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Blend {
+    /// The lengths themselves.
+    #[default]
+    Lengths,
+    /// Their squares (R14 §6: right for anisotropic stretch, where diagonals do not scale with the sides).
+    /// A negative sum becomes length 0.
+    Squares,
+    /// Their logarithms: between discretely conformally equivalent poses, b_ij = exp((u_i + u_j) / 2) a_ij,
+    /// this interpolates the factors u (R14 §5, [`crate::inbetween::conformal::scaled`]). Unlike lengths
+    /// and squares, it need not give triangles between triangles.
+    Logarithms,
+}
+
+impl Blend {
+    /// One edge between poses in which it has these lengths; poses of weight 0 do not count.
+    pub fn length(self, weights: &[f64], lengths: impl Iterator<Item = f64>) -> f64 {
+        let pairs = weights.iter().zip(lengths).filter(|(w, _)| **w != 0.0);
+        match self {
+            Blend::Lengths => pairs.map(|(w, l)| w * l).sum(),
+            Blend::Squares => pairs.map(|(w, l)| w * l * l).sum::<f64>().max(0.0).sqrt(),
+            Blend::Logarithms => libm::exp(pairs.map(|(w, l)| w * libm::log(l)).sum()),
+        }
+    }
+}
+
 /// Poses of one connectivity with what blends need of each: lengths, dihedral angles on a common branch,
 /// and how each is turned against the first.
 #[derive(Debug, Clone)]
@@ -86,29 +113,21 @@ impl KeyShapes {
         &self.dihedrals[pose]
     }
 
-    /// Weighted sums of lengths and dihedral angles, to be embedded. With `squared` the squares of lengths
-    /// are summed (R14 §6: right for anisotropic stretch, where diagonals do not scale with the sides);
-    /// a negative sum becomes length 0. Weights should sum to 1.
+    /// Weighted sums of lengths and dihedral angles, to be embedded. Weights should sum to 1.
     ///
     /// The guide has each part's own vertices blended in the frame of its mean rotation, so that it does
     /// not collapse where poses are turned against each other.
     ///
     /// # Panics
     /// There is not one weight a pose.
-    pub fn blend(&self, weights: &[f64], squared: bool) -> Target {
+    pub fn blend(&self, weights: &[f64], blend: Blend) -> Target {
         assert_eq!(weights.len(), self.poses.len(), "one weight a pose");
-        let lengths = match squared {
-            false => sum(weights, &self.lengths, |l| l),
-            true => {
-                let squares = sum(weights, &self.lengths, |l| l * l);
-                squares.into_iter().map(|l| l.max(0.0).sqrt()).collect()
-            }
-        };
+        let lengths = (0..self.lengths[0].len())
+            .map(|edge| blend.length(weights, self.lengths.iter().map(|row| row[edge])));
         Target {
-            lengths,
-            dihedrals: sum(weights, &self.dihedrals, |angle| angle),
+            lengths: lengths.collect(),
+            dihedrals: sum(weights, &self.dihedrals),
             guide: self.guide(weights),
-            off: (1.0 - weights.iter().copied().fold(0.0, f64::max)).max(0.0),
         }
     }
 
@@ -163,12 +182,12 @@ impl KeyShapes {
     }
 }
 
-/// The weighted sum of rows, each entry mapped first.
-fn sum(weights: &[f64], rows: &[Vec<f64>], map: impl Fn(f64) -> f64) -> Vec<f64> {
+/// The weighted sum of rows.
+fn sum(weights: &[f64], rows: &[Vec<f64>]) -> Vec<f64> {
     let mut total = vec![0.0; rows[0].len()];
     for (row, weight) in rows.iter().zip(weights) {
         for (total, &entry) in total.iter_mut().zip(row) {
-            *total += weight * map(entry);
+            *total += weight * entry;
         }
     }
     total

@@ -17,6 +17,7 @@
 //! have no equation (1); triangles that name a vertex twice take part with their lengths only. Vertices
 //! without a triangle are placed as in the guide.
 
+mod both_ways;
 mod closing;
 mod fans;
 mod finishing;
@@ -48,7 +49,7 @@ use crate::mesh::rigid_align::rigid;
 use crate::mesh::{Components, Hinges, Topology, VertexCorners};
 
 pub use guard::{Mending, Repair};
-pub use keys::{KeyShapes, Strain};
+pub use keys::{Blend, KeyShapes, Strain};
 pub use report::{EdgeFit, EmbedReport, Missed, PERCENTILES};
 pub use sequence::{Morph, Options, SequenceError, morph};
 
@@ -90,8 +91,6 @@ pub struct Target {
     pub dihedrals: Vec<f64>,
     /// A pose of 3V positions that each part of the result is laid on by a rigid motion.
     pub guide: Vec<f64>,
-    /// How far from the nearest pose: 1 - the largest weight; 0 where there are no poses.
-    pub off: f64,
 }
 
 /// A mesh that was embedded.
@@ -209,6 +208,14 @@ impl Embedding {
         self.fans.errors(&corners, dihedrals).energy()
     }
 
+    /// The first triangle, from 0, whose sides break its inequality or are no lengths at all.
+    ///
+    /// # Panics
+    /// There is not a length for each edge.
+    pub fn broken_triangle(&self, lengths: &[f64]) -> Option<usize> {
+        shape::broken_triangle(&self.hinges, lengths).map(|(triangle, _)| triangle)
+    }
+
     /// A shape with these lengths, or whose lengths come nearest them.
     ///
     /// # Errors
@@ -221,7 +228,6 @@ impl Embedding {
             lengths,
             dihedrals,
             guide,
-            ..
         } = target;
         assert_eq!(lengths.len(), self.edges().len(), "lengths of another mesh");
         assert_eq!(
@@ -366,9 +372,14 @@ impl Embedding {
 
 /// Angles moved by whole turns to within a half turn of `near`.
 fn near_branch(mut angles: Vec<f64>, near: &[f64]) -> Vec<f64> {
-    let turn = std::f64::consts::TAU;
     for (angle, near) in angles.iter_mut().zip(near) {
-        *angle += turn * libm::round((near - *angle) / turn);
+        *angle -= std::f64::consts::TAU * libm::round((*angle - near) / std::f64::consts::TAU);
     }
     angles
+}
+
+/// A difference of angles within a half turn.
+fn wrapped(angle: f64) -> f64 {
+    let turn = std::f64::consts::TAU;
+    angle - turn * libm::round(angle / turn)
 }

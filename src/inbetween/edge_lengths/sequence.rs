@@ -4,17 +4,20 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use super::both_ways::{Frames, Stopped};
 use super::guard::{Fill, Repair, repair};
-use super::{EmbedError, EmbedReport, Embedded, Embedding, KeyShapes, Memory, Target};
+use super::{
+    Blend, EmbedError, EmbedReport, Embedded, Embedding, KeyShapes, Memory, Target, wrapped,
+};
 use crate::mesh::Topology;
-use crate::space::{SpaceError, Spaces};
+use crate::space::{SpaceError, Spaces, StraightPath};
 use crate::task::{Cancelled, Task};
 
 /// How a sequence is made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Options {
-    /// Squares of lengths are blended instead of lengths.
-    pub squared: bool,
+    /// What is blended.
+    pub blend: Blend,
     /// Every so many frames one is embedded (1: all), lengths and dihedral angles are blended between
     /// (R14 §3; Winkler et al. 2010). The last frame and those that are a pose are always embedded.
     pub every: usize,
@@ -23,7 +26,7 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         Options {
-            squared: false,
+            blend: Blend::Lengths,
             every: 1,
         }
     }
@@ -86,20 +89,23 @@ pub fn morph(
     task: &Task,
 ) -> Result<Morph, SequenceError> {
     let chosen = chosen(weights, options.every);
-    let mut follower = Follower::new(embedding);
-    let mut embedded = Vec::with_capacity(chosen.len());
-    for &frame in &chosen {
-        task.check()?;
-        let found = match pose_of(&weights[frame]) {
-            Some(pose) => Ok(follower.pose(keys, pose)),
-            None => follower.next(&keys.blend(&weights[frame], options.squared)),
-        };
-        embedded.push(found.map_err(|error| SequenceError::Embed { frame, error })?);
-        task.step();
-    }
     let rows: Vec<Vec<f64>> = chosen.iter().map(|&frame| weights[frame].clone()).collect();
+    let frames = Frames {
+        embedding,
+        keys,
+        blend: options.blend,
+        rows: &rows,
+        task,
+    };
+    let mut embedded = frames.embedded().map_err(|stopped| match stopped {
+        Stopped::Cancelled => SequenceError::Cancelled,
+        Stopped::Embed(at, error) => SequenceError::Embed {
+            frame: chosen[at],
+            error,
+        },
+    })?;
     let fill = |from: &[f64], to: &[f64], count: usize| between(topology, from, to, count);
-    let blend = |weights: &[f64]| keys.blend(weights, options.squared);
+    let blend = |weights: &[f64]| keys.blend(weights, options.blend);
     let mut repairs = repair(embedding, &blend, &rows, &mut embedded, &fill)?;
     repairs
         .iter_mut()
@@ -160,35 +166,22 @@ fn between(
     to: &[f64],
     count: usize,
 ) -> Result<Vec<Vec<f64>>, SpaceError> {
-    let spaces = Spaces::new(Arc::clone(topology), from);
-    let space = spaces.open("lengths-angles", &[])?;
-    let encoded = |pose: &[f64]| {
-        let mut row = vec![0.0; space.dimension()];
-        space.encode(pose, &mut row);
-        row
-    };
-    let (first, mut last) = (encoded(from), encoded(to));
-    space.follow(&first, &mut last);
+    let space = Spaces::new(Arc::clone(topology), from).open("lengths-angles", &[])?;
+    let path = StraightPath::new(space, from, to);
     let shape = |step: usize| {
-        let t = (step + 1) as f64 / (count + 1) as f64;
-        let row: Vec<f64> = first
-            .iter()
-            .zip(&last)
-            .map(|(a, b)| a + t * (b - a))
-            .collect();
         let mut positions = vec![0.0; from.len()];
-        space.decode(&row, &mut positions);
+        path.at((step + 1) as f64 / (count + 1) as f64, &mut positions);
         positions
     };
     Ok((0..count).into_par_iter().map(shape).collect())
 }
 
-/// Embeds one target after the other; what the solved dihedral angles differ from the blended ones by is
-/// carried to the next guess, and fades as the next pose comes near.
+/// Embeds one target after the other: what the solved dihedral angles differ from the blended ones by is
+/// carried to the next guess.
 pub(super) struct Follower<'a> {
     embedding: &'a Embedding,
     memory: Memory,
-    carried: Option<(Vec<f64>, f64)>,
+    carried: Option<Vec<f64>>,
 }
 
 impl<'a> Follower<'a> {
@@ -207,23 +200,12 @@ impl<'a> Follower<'a> {
         follower
     }
 
-    /// A pose as it is: nothing is carried over it.
-    pub(super) fn pose(&mut self, keys: &KeyShapes, pose: usize) -> Embedded {
-        self.carried = None;
-        self.embedding.known(keys, pose)
-    }
-
     /// The next frame.
     pub(super) fn next(&mut self, target: &Target) -> Result<Embedded, EmbedError> {
         let mut guessed = target.clone();
-        if let Some((carried, off)) = &self.carried {
-            let fading = if *off > 0.0 {
-                (target.off / off).min(1.0)
-            } else {
-                1.0
-            };
+        if let Some(carried) = &self.carried {
             let angles = guessed.dihedrals.iter_mut().zip(carried);
-            angles.for_each(|(angle, carried)| *angle += fading * carried);
+            angles.for_each(|(angle, carried)| *angle += carried);
         }
         let found = self.embedding.embed(&guessed, &mut self.memory)?;
         self.carry(&found, target);
@@ -232,7 +214,7 @@ impl<'a> Follower<'a> {
 
     fn carry(&mut self, found: &Embedded, target: &Target) {
         let differences = found.dihedrals.iter().zip(&target.dihedrals);
-        let carried = differences.map(|(found, blended)| found - blended);
-        self.carried = Some((carried.collect(), target.off));
+        let carried = differences.map(|(found, blended)| wrapped(found - blended));
+        self.carried = Some(carried.collect());
     }
 }

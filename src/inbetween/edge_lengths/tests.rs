@@ -32,7 +32,7 @@ fn torus(n: usize, m: usize, bump: f64) -> (Topology, Vec<f64>) {
 }
 
 /// A closed ball of n rings of m vertices and two poles: genus 0, bumpy.
-fn ball(n: usize, m: usize, bump: f64) -> (Topology, Vec<f64>) {
+pub(super) fn ball(n: usize, m: usize, bump: f64) -> (Topology, Vec<f64>) {
     let mut points = Vec::new();
     for i in 0..n {
         for j in 0..m {
@@ -163,7 +163,6 @@ fn disturbed(embedding: &Embedding, pose: &[f64], noise: f64) -> Target {
         lengths: embedding.lengths(pose),
         dihedrals,
         guide: pose.to_vec(),
-        off: 0.0,
     }
 }
 
@@ -275,7 +274,7 @@ fn surfaces_with_handles_are_embedded_too() {
     // blends of two tori have six edges more than freedoms: they are met nearly
     let (_, other) = torus(24, 12, 0.02);
     let keys = KeyShapes::new(&embedding, &[&pose, &other]);
-    let target = keys.blend(&[0.5, 0.5], false);
+    let target = keys.blend(&[0.5, 0.5], Blend::Lengths);
     let found = embedding.embed(&target, &mut Memory::default()).unwrap();
     assert!(
         found.report.edges.max_percent() < 1.0,
@@ -385,7 +384,7 @@ fn the_order_of_corners_and_of_triangles_does_not_matter() {
     let halfway = |topology: &Topology| {
         let embedding = Embedding::new(topology).unwrap();
         let keys = KeyShapes::new(&embedding, &[&pose, &other]);
-        let target = keys.blend(&[0.5, 0.5], false);
+        let target = keys.blend(&[0.5, 0.5], Blend::Lengths);
         embedding.embed(&target, &mut Memory::default()).unwrap()
     };
     let (one, two) = (halfway(&topology), halfway(&again));
@@ -437,11 +436,11 @@ fn poses_are_reproduced_and_blends_lie_between() {
     let embedding = Embedding::new(&topology).unwrap();
     let keys = KeyShapes::new(&embedding, &[&pose, &bent]);
     for (at, wanted) in [(0.0, &pose), (1.0, &bent)] {
-        let target = keys.blend(&[1.0 - at, at], false);
+        let target = keys.blend(&[1.0 - at, at], Blend::Lengths);
         let found = embedding.embed(&target, &mut Memory::default()).unwrap();
         assert!(farthest(&found.positions, wanted) < 1e-9);
     }
-    let half = keys.blend(&[0.5, 0.5], true);
+    let half = keys.blend(&[0.5, 0.5], Blend::Squares);
     for (edge, length) in half.lengths.iter().enumerate() {
         let [a, b] = [keys.lengths(0)[edge], keys.lengths(1)[edge]];
         assert!((length * length - 0.5 * (a * a + b * b)).abs() < 1e-12);
@@ -477,7 +476,7 @@ fn results_do_not_depend_on_threads_or_on_memory() {
             let embedding = Embedding::new(&topology).unwrap();
             let keys = KeyShapes::new(&embedding, &[&pose, &other]);
             embedding
-                .embed(&keys.blend(&[0.4, 0.6], false), memory)
+                .embed(&keys.blend(&[0.4, 0.6], Blend::Lengths), memory)
                 .unwrap()
                 .positions
         })
@@ -487,10 +486,10 @@ fn results_do_not_depend_on_threads_or_on_memory() {
     assert_eq!(first, run(2, &mut Memory::default()));
     let embedding = Embedding::new(&topology).unwrap();
     let keys = KeyShapes::new(&embedding, &[&pose, &other]);
-    let target = keys.blend(&[0.4, 0.6], false);
+    let target = keys.blend(&[0.4, 0.6], Blend::Lengths);
     let mut kept = Memory::default();
     embedding
-        .embed(&keys.blend(&[0.9, 0.1], false), &mut kept)
+        .embed(&keys.blend(&[0.9, 0.1], Blend::Lengths), &mut kept)
         .unwrap();
     assert_eq!(
         first,

@@ -1,4 +1,4 @@
-//! The method `edge-lengths` (Rojas et al. 2014).
+//! The method `edge-lengths` (Rojas et al. 2014), which also embeds the lengths of `conformal`.
 
 use std::sync::Arc;
 
@@ -6,13 +6,12 @@ use serde::Serialize;
 
 use super::edges::{EdgeReport, FrameErrors, Strain, lengths};
 use super::path::weights;
-use super::{Morph, MorphMethod, MorphReport, MorphRequest, doubles, morph_frames};
+use super::{Morph, MorphMethod, MorphReport, MorphRequest, morph_frames};
 use crate::diag::{Diagnostic, Result, Warned};
 use crate::inbetween::edge_lengths::{
-    self, EmbedError, EmbedReport, Embedding, KeyShapes, Mending, Options, SequenceError,
+    self, Blend, EmbedError, EmbedReport, Embedding, KeyShapes, Mending, Options, SequenceError,
 };
 use crate::mesh::{Edges, FrameSource, Sequence};
-use crate::space::SpaceError;
 use crate::task::Task;
 
 /// How the embedding of lengths went, over all frames.
@@ -83,28 +82,26 @@ pub struct JumpReport {
 /// Rows of the report at most.
 const LISTED: usize = 20;
 
-/// The frames of a request along its path.
+/// The frames of a request along its path among `shapes` of the mesh of `poses`, `blend` of their lengths.
 pub(super) fn morph(
     poses: &Sequence,
+    (embedding, shapes): (&Embedding, &[Vec<f64>]),
     request: &MorphRequest,
+    blend: Blend,
     task: &Task,
 ) -> Result<Warned<Morph>> {
     let frames = morph_frames(poses, request)?;
-    let rows = weights(request.path.as_ref(), frames, poses.frames())?;
+    let rows = weights(request.path.as_ref(), frames, shapes.len())?;
     let topology = Arc::clone(poses.topology());
-    let embedding = Embedding::new(&topology).map_err(SpaceError::from)?;
-    let shapes: Vec<Vec<f64>> = (0..poses.frames())
-        .map(|pose| doubles(poses, pose))
-        .collect();
     let shapes: Vec<&[f64]> = shapes.iter().map(Vec::as_slice).collect();
-    let keys = KeyShapes::new(&embedding, &shapes);
+    let keys = KeyShapes::new(embedding, &shapes);
     task.phase("morph", frames);
     let options = Options {
-        squared: request.squared,
+        blend,
         every: request.every.unwrap_or(1),
     };
-    let found = edge_lengths::morph(&embedding, &topology, &keys, &rows, options, task)
-        .map_err(|error| told(error, poses))?;
+    let found = edge_lengths::morph(embedding, &topology, &keys, &rows, options, task)
+        .map_err(|error| told(error, poses, blend))?;
     let edges = Edges::new(&topology);
     let mut positions: Vec<f32> = Vec::with_capacity(frames * 3 * topology.vertices());
     let (mut errors, mut strain) = (Vec::new(), Strain::default());
@@ -119,17 +116,11 @@ pub(super) fn morph(
         let start = positions.len();
         positions.extend(frame.iter().map(|&x| x as f32));
         let written: Vec<f64> = positions[start..].iter().map(|&x| f64::from(x)).collect();
-        let wanted = |edge: usize| {
-            let each = row.iter().zip(&own).map(|(w, lengths)| (w, lengths[edge]));
-            match request.squared {
-                false => each.map(|(w, l)| w * l).sum::<f64>(),
-                true => each.map(|(w, l)| w * l * l).sum::<f64>().max(0.0).sqrt(),
-            }
-        };
+        let wanted = |edge: usize| blend.length(row, own.iter().map(|lengths| lengths[edge]));
         errors.push(FrameErrors::of(edges.ends(), wanted, &written));
     }
-    let report = report(&embedding, &found);
-    let warnings = warnings(&embedding, &report);
+    let report = report(embedding, &found);
+    let warnings = warnings(embedding, &report);
     Ok(Warned {
         output: Morph {
             frames: Sequence::new(topology, positions, poses.fps()),
@@ -139,6 +130,7 @@ pub(super) fn morph(
                 edges: EdgeReport::of(&errors),
                 strain,
                 alignment: None,
+                conformal: None,
                 embedding: Some(report),
             },
         },
@@ -147,7 +139,7 @@ pub(super) fn morph(
 }
 
 /// What is said of lengths without an embedding.
-fn told(error: SequenceError, poses: &Sequence) -> Box<Diagnostic> {
+fn told(error: SequenceError, poses: &Sequence, blend: Blend) -> Box<Diagnostic> {
     match error {
         SequenceError::Space(error) => error.into(),
         SequenceError::Cancelled => crate::task::Cancelled.into(),
@@ -157,7 +149,14 @@ fn told(error: SequenceError, poses: &Sequence) -> Box<Diagnostic> {
             let corners = triangles[triangle].map(|vertex| vertex + 1);
             let [a, b, c] = corners;
             let told = Diagnostic::error(format!("{error} (vertices {a}, {b}, {c})"));
-            let hint = "inside the poses lengths always make triangles: keep the weights of the path between 0 and 1";
+            let hint = match blend {
+                Blend::Logarithms => {
+                    "factors between two shapes may leave what makes triangles: rounder triangles there, or a pose between, keep the way open"
+                }
+                _ => {
+                    "inside the poses lengths always make triangles: keep the weights of the path between 0 and 1"
+                }
+            };
             Box::new(told.at_frame(frame + 1).hint(hint))
         }
     }

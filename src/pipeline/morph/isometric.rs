@@ -31,10 +31,7 @@ pub(super) fn morph(poses: &Sequence, moments: &[Moment], task: &Task) -> Result
         let morph = between(&connectivity, &pair, Alignment::Rigid)?;
         warnings.extend(opposite_warning(morph.opposite(), first));
         let report = effect_of_alignment(&connectivity, poses, &pair, &morph)?;
-        alignment = match alignment {
-            Some(known) if known.turn_degrees >= report.turn_degrees => Some(known),
-            _ => Some(report),
-        };
+        alignment = Some(report.or_more(alignment));
         rows.into_par_iter()
             .zip(moments)
             .try_for_each(|(row, moment)| -> Result<()> {
@@ -91,6 +88,8 @@ fn effect_of_alignment(
             edge_worst_percent: errors.worst_percent(),
             normal_mean_degrees: mean.to_degrees(),
             normal_worst_degrees: worst.to_degrees(),
+            joint_mean_degrees: None,
+            joint_worst_degrees: None,
         }
     };
     Ok(AlignmentReport {

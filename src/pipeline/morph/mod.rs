@@ -1,6 +1,7 @@
 //! Morphs: poses of one mesh to the frames between them, by any of the methods. To add a method: a file
 //! beside this one and a line in [`MorphMethod`].
 
+mod conformal;
 mod edge_lengths;
 mod edges;
 mod isometric;
@@ -14,9 +15,12 @@ use std::sync::Arc;
 use serde::Serialize;
 
 use crate::diag::{Diagnostic, Result, Warned};
+use crate::inbetween::edge_lengths::{Blend, Embedding};
 use crate::mesh::{FrameSource, Sequence};
+use crate::space::SpaceError;
 use crate::task::Task;
 
+pub use conformal::ConformalReport;
 pub use edge_lengths::{EmbeddingReport, ImpossibleVertex, JumpReport, MissedEdge};
 pub use edges::{EdgeReport, Strain};
 pub use path::MorphPath;
@@ -34,6 +38,9 @@ pub enum MorphMethod {
     Spline,
     /// Lengths linear and met exactly where a shape has them: see [`crate::inbetween::edge_lengths`].
     EdgeLengths,
+    /// One factor a vertex scales the edges at it, between conformally equivalent poses or from one closed
+    /// mesh to the sphere: see [`crate::inbetween::conformal`].
+    Conformal,
 }
 
 impl MorphMethod {
@@ -42,6 +49,7 @@ impl MorphMethod {
         MorphMethod::Isometric,
         MorphMethod::Spline,
         MorphMethod::EdgeLengths,
+        MorphMethod::Conformal,
     ];
 
     /// Its name on the command line and in recipes.
@@ -50,6 +58,7 @@ impl MorphMethod {
             MorphMethod::Isometric => "isometric",
             MorphMethod::Spline => "spline",
             MorphMethod::EdgeLengths => "edge-lengths",
+            MorphMethod::Conformal => "conformal",
         }
     }
 }
@@ -77,7 +86,7 @@ pub struct MorphRequest {
     /// The shape space's name; for the method `spline`, patch-lri if not given.
     pub space: Option<String>,
     /// Where the frames lie among the poses; if not given, from each pose to the next. For the method
-    /// `edge-lengths`, as the two below.
+    /// `edge-lengths`, as the two below; `every` and this also for `conformal`.
     pub path: Option<MorphPath>,
     /// Squares of lengths are blended instead of lengths.
     pub squared: bool,
@@ -108,10 +117,13 @@ pub struct MorphReport {
     pub edges: EdgeReport,
     /// How far the poses are from isometric: the largest of each pair of neighbours.
     pub strain: Strain,
-    /// What taking off the rigid motion changes; for the method `isometric`.
+    /// What taking off the rigid motion changes; for the method `isometric`, of meshes and of skeletons.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub alignment: Option<AlignmentReport>,
-    /// How lengths were embedded; for the method `edge-lengths`.
+    /// How the poses are equivalent; for the method `conformal`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub conformal: Option<ConformalReport>,
+    /// How lengths were embedded; for the methods `edge-lengths` and `conformal`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub embedding: Option<EmbeddingReport>,
 }
@@ -139,6 +151,23 @@ pub struct AlignmentEffect {
     pub normal_mean_degrees: f64,
     /// The largest such angle.
     pub normal_worst_degrees: f64,
+    /// Of a skeleton, mean error of the angle between a bone and its parent's, against the mean of both
+    /// poses: a skeleton that only turns keeps its angles where that turn was taken off.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub joint_mean_degrees: Option<f64>,
+    /// The largest such error.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub joint_worst_degrees: Option<f64>,
+}
+
+impl AlignmentReport {
+    /// Of two pairs the one that turns more.
+    fn or_more(self, known: Option<Self>) -> Self {
+        match known {
+            Some(known) if known.turn_degrees >= self.turn_degrees => known,
+            _ => self,
+        }
+    }
 }
 
 /// Where in a morph a frame is.
@@ -150,12 +179,16 @@ struct Moment {
     t: f64,
 }
 
-/// How many frames [`morph`] gives.
+/// How many frames [`morph`] gives. One pose alone is enough for the method `conformal`: the sphere is the
+/// other.
 ///
 /// # Errors
 /// Fewer than two poses or frames.
 pub fn morph_frames(poses: &Sequence, request: &MorphRequest) -> Result<usize> {
-    wanted_frames(poses.frames(), request)
+    match (request.method, poses.frames()) {
+        (MorphMethod::Conformal, 1) => wanted_frames(2, request),
+        (_, count) => wanted_frames(count, request),
+    }
 }
 
 fn wanted_frames(count: usize, request: &MorphRequest) -> Result<usize> {
@@ -178,22 +211,33 @@ fn wanted_frames(count: usize, request: &MorphRequest) -> Result<usize> {
 /// # Errors
 /// As [`morph_frames`]; a mesh that the method does not suit, cancellation.
 pub fn morph(poses: &Sequence, request: &MorphRequest, task: &Task) -> Result<Warned<Morph>> {
-    let (count, frames) = (poses.frames(), morph_frames(poses, request)?);
-    let moments = moments(frames, count);
+    let frames = morph_frames(poses, request)?;
+    if request.method != MorphMethod::Spline {
+        no_space(request)?;
+    }
+    only_by_lengths(request)?;
+    let moments = || moments(frames, poses.frames());
     let mut morph = match request.method {
         MorphMethod::Isometric => {
-            no_space(request)?;
-            only_edge_lengths(request)?;
-            isometric::morph(poses, &moments, task)?.measured(poses, &moments, request.method)
+            isometric::morph(poses, &moments(), task)?.measured(poses, &moments(), request.method)
         }
-        MorphMethod::Spline => {
-            only_edge_lengths(request)?;
-            spline::morph(poses, &moments, request, task)?.measured(poses, &moments, request.method)
-        }
+        MorphMethod::Spline => spline::morph(poses, &moments(), request, task)?.measured(
+            poses,
+            &moments(),
+            request.method,
+        ),
         MorphMethod::EdgeLengths => {
-            no_space(request)?;
-            edge_lengths::morph(poses, request, task)?
+            let blend = match request.squared {
+                false => Blend::Lengths,
+                true => Blend::Squares,
+            };
+            let embedding = Embedding::new(poses.topology()).map_err(SpaceError::from)?;
+            let shapes = (0..poses.frames()).map(|pose| doubles(poses, pose));
+            let shapes: Vec<Vec<f64>> = shapes.collect();
+            edge_lengths::morph(poses, (&embedding, &shapes), request, blend, task)?
         }
+        // its lengths are to change
+        MorphMethod::Conformal => return conformal::morph(poses, request, task),
     };
     morph
         .warnings
@@ -225,6 +269,7 @@ impl Warned<Found> {
             edges,
             strain,
             alignment,
+            conformal: None,
             embedding: None,
         };
         Warned {
@@ -247,12 +292,19 @@ fn no_space(request: &MorphRequest) -> Result<()> {
     }
 }
 
-/// Refuses options that other methods do not know.
-fn only_edge_lengths(request: &MorphRequest) -> Result<()> {
+/// Refuses options that the method does not know.
+fn only_by_lengths(request: &MorphRequest) -> Result<()> {
+    let embeds = matches!(
+        request.method,
+        MorphMethod::EdgeLengths | MorphMethod::Conformal
+    );
     let given = [
-        ("path", request.path.is_some()),
-        ("squared", request.squared),
-        ("every", request.every.is_some()),
+        ("path", request.path.is_some() && !embeds),
+        (
+            "squared",
+            request.squared && request.method != MorphMethod::EdgeLengths,
+        ),
+        ("every", request.every.is_some() && !embeds),
     ];
     match given.iter().find(|(_, given)| *given) {
         None => Ok(()),

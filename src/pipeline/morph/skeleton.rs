@@ -4,7 +4,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::edges::{EdgeReport, FrameErrors, Strain, lengths, strain_warning};
-use super::{MorphMethod, MorphReport, MorphRequest, moments, no_space, wanted_frames};
+use super::{
+    AlignmentEffect, AlignmentReport, MorphMethod, MorphReport, MorphRequest, moments, no_space,
+    wanted_frames,
+};
 use crate::diag::{Diagnostic, Result, Warned};
 use crate::format::skeleton::{SkeletonFormat, by_ending};
 use crate::inbetween::isometric::Alignment;
@@ -110,6 +113,7 @@ pub fn morph_skeletons(
     let (bones, width) = (poses.skeleton.bones(), poses.frame(0).len());
     let mut positions = vec![0.0; frames * width];
     let (mut errors, mut strain, mut warnings) = (Vec::new(), Strain::default(), Vec::new());
+    let mut alignment = None;
     let mut rows = positions.chunks_exact_mut(width);
     for moments in moments(frames, count).chunk_by(|a, b| a.pose == b.pose) {
         let first = moments[0].pose;
@@ -118,6 +122,10 @@ pub fn morph_skeletons(
         let morph = SkeletonMorph::new(&poses.skeleton, pair[0], pair[1], Alignment::Rigid);
         strain = strain.join(Strain::between(&ends[0], &ends[1]));
         warnings.extend(opposite_warning(&poses.skeleton, morph.opposite(), first));
+        if first + 1 < count {
+            let report = effect_of_alignment(&poses.skeleton, pair, &morph);
+            alignment = Some(report.or_more(alignment));
+        }
         for (moment, row) in moments.iter().zip(&mut rows) {
             task.check()?;
             match moment.t == 0.0 {
@@ -142,11 +150,63 @@ pub fn morph_skeletons(
                 poses: count,
                 edges: EdgeReport::of(&errors),
                 strain,
-                alignment: None,
+                alignment,
+                conformal: None,
                 embedding: None,
             },
         },
         warnings,
+    })
+}
+
+/// What the alignment changes half way. Lengths of bones are exact and directions on their great circles
+/// with and without it; what differs is the angles at joints.
+fn effect_of_alignment(
+    skeleton: &Skeleton,
+    [from, to]: [&[f64]; 2],
+    morph: &SkeletonMorph,
+) -> AlignmentReport {
+    let wanted: Vec<f64> = joint_angles(skeleton, from)
+        .zip(joint_angles(skeleton, to))
+        .map(|(a, b)| 0.5 * (a + b))
+        .collect();
+    let effect = |morph: &SkeletonMorph| {
+        let mut half = vec![0.0; from.len()];
+        morph.at(0.5, &mut half);
+        let pairs = joint_angles(skeleton, &half).zip(&wanted);
+        let errors = pairs.map(|(found, wanted)| (found - wanted).abs().to_degrees());
+        let (sum, worst) = errors.fold((0.0, 0.0_f64), |(sum, worst), error| {
+            (sum + error, worst.max(error))
+        });
+        AlignmentEffect {
+            edge_mean_percent: 0.0,
+            edge_worst_percent: 0.0,
+            normal_mean_degrees: 0.0,
+            normal_worst_degrees: 0.0,
+            joint_mean_degrees: Some(sum / wanted.len().max(1) as f64),
+            joint_worst_degrees: Some(worst),
+        }
+    };
+    let bare = SkeletonMorph::new(skeleton, from, to, Alignment::None);
+    AlignmentReport {
+        turn_degrees: morph.turn().to_degrees(),
+        with: effect(morph),
+        without: effect(&bare),
+    }
+}
+
+/// The angle between each bone and its parent's, where there is one.
+fn joint_angles(skeleton: &Skeleton, pose: &[f64]) -> impl Iterator<Item = f64> {
+    let joints = skeleton.joints();
+    let bone = |joint: u32, parent: u32| {
+        let [a, b] = [parent, joint].map(|at| &pose[3 * at as usize..][..3]);
+        nalgebra::Vector3::from_fn(|axis, _| b[axis] - a[axis])
+    };
+    (0..joints.len() as u32).filter_map(move |joint| {
+        let parent = joints[joint as usize].parent?;
+        let before = joints[parent as usize].parent?;
+        let (one, two) = (bone(parent, before), bone(joint, parent));
+        Some(libm::atan2(one.cross(&two).norm(), one.dot(&two)))
     })
 }
 

@@ -98,7 +98,8 @@ impl Workbench {
     /// # Errors
     /// None that finite poses can cause.
     pub fn mean_shape(&self, found: &StatisticsValue) -> Result<Warned<ShapeValue>> {
-        self.keyed_shape(found.value.mean()?, found.then("mean").finish())
+        let mean = found.value.mean()?.map(|found| found.output);
+        self.keyed_shape(mean, found.then("mean").finish())
     }
 
     /// The shape so many standard deviations along a mode, from 1.
@@ -112,7 +113,8 @@ impl Workbench {
         sigmas: f64,
     ) -> Result<Warned<ShapeValue>> {
         let key = found.then("mode").number(mode as f64).number(sigmas);
-        self.keyed_shape(found.value.sample(mode, sigmas)?, key.finish())
+        let sample = found.value.sample(mode, sigmas)?;
+        self.keyed_shape(sample.map(|found| found.output), key.finish())
     }
 
     /// A pose with the difference between two others added: pose, from, to.

@@ -67,7 +67,8 @@ mod functions {
     /// "spline": one curve through all poses in a shape space (patch-lri); "edge-lengths": lengths go
     /// linearly and are met as near as a shape can. With that, path may be "circle" (four poses at the
     /// corners of a square) or points ([x, y] in that square, else one weight a pose), squared blends the
-    /// squares of lengths, and every embeds each so many frames only.
+    /// squares of lengths, and every embeds each so many frames only. "conformal": one factor a vertex scales
+    /// the edges at it, between conformally equivalent poses, or from one closed mesh to the sphere.
     ///
     /// ```rhai
     /// let bar = demo("bar");
@@ -77,6 +78,8 @@ mod functions {
     /// let back = morph([bar.frame(1), bar.frame(20)],
     ///     #{ method: "edge-lengths", path: [[0, 1], [0.5, 0.5]], frames: 2 });
     /// check(compare(back.frame(2), bend.frame(3)).edge_rms_percent < 1, "half way both keep lengths");
+    /// let ball = morph([demo("cactus").frame(1)], #{ method: "conformal", frames: 3 });
+    /// check(ball.frames == 3, "the last is the sphere");
     /// ```
     #[rhai_fn(name = "morph", return_raw)]
     pub fn morph(call: NativeCallContext, poses: Dynamic) -> Raw<Frames> {
