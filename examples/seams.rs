@@ -2,7 +2,7 @@
 //!
 //! Loops of an eighth to three quarters of the motion are laid over it evenly and added as a recipe adds
 //! them, by `fit(input()).add_loop(a, b)`. The table gives for each the frames of the bridge and the ratios
-//! of its seam (PEERS.md E.6).
+//! of its seam (PEERS.md E.6), and how the motion accelerates by itself about the ends a and b.
 //!
 //! ```text
 //! cargo run --release --example seams [CAPTURE] [--out FOLDER]
@@ -81,11 +81,8 @@ fn spread(figure: &mut Figure, name: &str, loom: &Loom) -> Result<()> {
         worst = worst.max(looped.seam.worst());
         shown += usize::from(looped.seam.worst() > SHOWS);
         let mut row = row((from, to), &looped, began.elapsed().as_millis());
-        row.extend(own(loom, from, to));
+        row.extend(own(loom, from, to)?);
         rows.push(row);
-        if std::env::var("PROFILE").is_ok_and(|p| p == format!("{from}..{to}")) {
-            profile(&looped, to);
-        }
     }
     println!("{name}");
     table(
@@ -125,11 +122,11 @@ fn row((from, to): (usize, usize), looped: &Looped, ms: u128) -> Vec<String> {
 }
 
 /// The motion's own accelerations about the ends, over their median.
-fn own(loom: &Loom, from: usize, to: usize) -> Vec<String> {
+fn own(loom: &Loom, from: usize, to: usize) -> Result<Vec<String>> {
     let n = loom.frames();
-    let x: Vec<Vec<f64>> = (1..=n)
-        .map(|t| loom.coordinates_at(t as f64).unwrap())
-        .collect();
+    let x = (1..=n)
+        .map(|t| loom.coordinates_at(t as f64))
+        .collect::<Result<Vec<_>>>()?;
     let bend = |i: usize| -> f64 {
         if i < 2 || i >= n {
             return 0.0;
@@ -146,48 +143,8 @@ fn own(loom: &Loom, from: usize, to: usize) -> Vec<String> {
     let mut all: Vec<f64> = (2..n).map(bend).collect();
     all.sort_by(f64::total_cmp);
     let median = all[all.len() / 2];
-    [to - 1, to, from, from + 1]
+    Ok([to - 1, to, from, from + 1]
         .iter()
         .map(|&i| format!("{:.2}", bend(i) / median))
-        .collect()
-}
-
-fn profile(looped: &Looped, to: usize) {
-    let l = &looped.loom;
-    let n = l.frames();
-    let x: Vec<Vec<f64>> = (1..=n)
-        .map(|t| l.coordinates_at(t as f64).unwrap())
-        .collect();
-    let norm = |v: Vec<f64>| v.iter().map(|d| d * d).sum::<f64>().sqrt();
-    let bend = |i: usize| {
-        norm(
-            (0..x[0].len())
-                .map(|k| x[i - 2][k] - 2.0 * x[i - 1][k] + x[i][k])
-                .collect(),
-        )
-    };
-    let step = |i: usize| norm((0..x[0].len()).map(|k| x[i][k] - x[i - 1][k]).collect());
-    let mut all: Vec<f64> = (2..n).map(bend).collect();
-    all.sort_by(f64::total_cmp);
-    let median = all[all.len() / 2];
-    let mean = (1..n).map(step).sum::<f64>() / (n - 1) as f64;
-    println!(
-        "k {} n {n} l {} m {}",
-        l.time().controls().len(),
-        l.pose().sites().len(),
-        l.pose().modes()
-    );
-    for i in to.saturating_sub(8).max(2)..(to + looped.bridge + 10).min(n) {
-        let p = l.position_at(i as f64).unwrap();
-        let (place, _) = l.time().place_at(i as f64).unwrap();
-        println!(
-            "{i:4} span {:3}+{:.3} p {:8.4} {:8.4} step {:.2} acc {:.2}",
-            place.span,
-            place.offset,
-            p[0],
-            p[1],
-            step(i) / mean,
-            bend(i) / median
-        );
-    }
+        .collect())
 }
