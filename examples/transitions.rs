@@ -1,11 +1,11 @@
 //! What is right between frames: the ordered method beside CH12's own, a cubic spline and linear blending.
 //!
 //! Every second frame of each capture is fitted with k = .8n, l = .6n, m = l/2, and the frames between are
-//! compared with psi there. The demos, or the capture of the command line. The picture shows each layout
+//! compared with psi there. The demos, or the captures of the command line. The picture shows each layout
 //! by CH12's distances and by the ordered method.
 //!
 //! ```text
-//! cargo run --release --example transitions [CAPTURE] [--out FOLDER]
+//! cargo run --release --example transitions [CAPTURE..] [--out FOLDER]
 //! ```
 
 mod support;
@@ -31,13 +31,14 @@ use support::{Figure, every};
 const SIDE: f32 = 420.0;
 
 fn main() -> ExitCode {
-    support::run("transitions", |figure| {
+    support::run_with("transitions", &["CAPTURE.."], |figure| {
         let captures: Vec<(String, Sequence, bool)> = if figure.is_demo() {
             let motions = DEMOS.iter().filter(|demo| demo.kind == Kind::Motion);
             let made = motions.map(|demo| (demo.name.to_string(), demo.generate(), demo.travels));
             made.collect()
         } else {
-            vec![("capture".to_string(), figure.capture("")?.0, false)]
+            let given = figure.captures()?.into_iter();
+            given.map(|(name, given)| (name, given, false)).collect()
         };
         header();
         let theme = Theme::light();

@@ -38,7 +38,8 @@ pub(crate) fn run(name: &'static str, draw: impl FnOnce(&mut Figure) -> Result<(
     run_with(name, &["CAPTURE"], draw)
 }
 
-/// As [`run`] for a figure of several inputs: all or none of them are given on the command line.
+/// As [`run`] for a figure of several inputs: all or none of them are given on the command line; any number
+/// where the only one ends in "..".
 pub(crate) fn run_with(
     name: &'static str,
     inputs: &[&str],
@@ -65,7 +66,8 @@ pub(crate) fn run_with(
         }
     }
     let given = usize::from(figure.capture.is_some()) + figure.others.len();
-    if given != 0 && given != inputs.len() {
+    let many = inputs.iter().any(|input| input.ends_with(".."));
+    if given != 0 && !many && given != inputs.len() {
         return usage();
     }
     match draw(&mut figure) {
@@ -88,6 +90,17 @@ impl Figure {
         };
         let view = View::looking(&sequence, direction);
         Ok((sequence, view))
+    }
+
+    /// All captures of the command line with their names.
+    pub(crate) fn captures(&self) -> Result<Vec<(String, Sequence)>> {
+        let name = |path: &PathBuf| {
+            let whole = path.to_string_lossy();
+            let last = whole.trim_end_matches('/').rsplit('/').next();
+            last.unwrap_or_default().to_string()
+        };
+        let paths = self.capture.iter().chain(&self.others);
+        paths.map(|path| Ok((name(path), open(path)?))).collect()
     }
 
     /// The inputs after the capture.

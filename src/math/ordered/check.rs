@@ -15,11 +15,16 @@ const OF_LINEAR: f64 = 0.2;
 /// What is below this part of a frame step in root mean square is not seen.
 const UNSEEN: f64 = 0.01;
 
-/// What a trial may be worse by than a good fit: refinement halves most errors, but seldom the worst.
+/// What a trial may deviate by between its samples, for 1 of a good fit: refinement halves most errors.
 const TRIAL: f64 = 3.0;
-const TRIAL_WORST: f64 = 1.4;
 /// Errors at the frames of so little are none.
 const EXACT: f64 = 5e-5;
+
+/// Weights grow by these powers of how many times what is allowed is missed, seen anywhere or known at
+/// frames, and by so much at most in one round.
+const SEEN: f64 = 0.6;
+const FRAMES: f64 = 0.5;
+const GROWTH: f64 = std::f64::consts::SQRT_2;
 
 /// Deviations of g(f(t)) from the motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,6 +43,8 @@ pub struct Quality {
     pub good: bool,
     /// Good up to so much that further refinement mends: what a first trial must be.
     pub promising: bool,
+    /// How many times what is wanted is missed, at the frames and between them; 1 where nothing is.
+    pub excess: f64,
 }
 
 impl Quality {
@@ -66,18 +73,46 @@ impl Quality {
             between,
             worst,
             spiked,
-            promising: !spiked && worst <= TRIAL_WORST * VISIBLE && between <= TRIAL * lost,
+            promising: !spiked && worst <= VISIBLE && between <= TRIAL * lost,
             good: !spiked && worst <= VISIBLE && between <= lost,
+            excess: (at_frames / frames_allowed(floor)).max(1.0)
+                * (worst / VISIBLE).max(1.0)
+                * (between / lost).max(1.0),
         }
-    }
-
-    /// Whether the frames are met, up to what is lost in `floor`, and nothing between them is seen.
-    pub(super) fn is_settled(&self, floor: f64) -> bool {
-        self.at_frames <= (OF_FLOOR * floor).max(EXACT) && self.worst <= VISIBLE
     }
 
     /// How bad: the deviation between the samples, the more the more it is seen in one place.
     pub(super) fn cost(&self) -> f64 {
         self.between * (self.worst / VISIBLE).max(1.0).sqrt()
     }
+}
+
+/// What may be missed at the frames, relative to the motion's spread, where the modes leave out `floor`.
+fn frames_allowed(floor: f64) -> f64 {
+    (OF_FLOOR * floor).max(EXACT)
+}
+
+/// By what the weight of each fitted sample is to grow: more than 1 where more than is lost in `floor` is
+/// missed at a frame, or more than is not seen at a sample or next to it.
+pub(super) fn growth(samples: &Samples, at: &Mat<f64>, between: &Mat<f64>, floor: f64) -> Vec<f64> {
+    let checks = (2 * samples.rate * samples.frames) as f64;
+    let allowed = frames_allowed(floor) * samples.spread / checks.sqrt();
+    let visible = VISIBLE * samples.step;
+    let missed = &samples.finer - between;
+    let seen = |row: usize| {
+        let around = (2 * row).saturating_sub(1)..(2 * row + 2).min(missed.nrows());
+        let largest = around.map(|row| missed.row(row).norm_l2());
+        libm::pow(largest.fold(0.0, f64::max) / visible, SEEN)
+    };
+    let known = |row: usize| {
+        let missed = (samples.dense.row(row) - at.row(row)).norm_l2();
+        libm::pow(missed / allowed, FRAMES)
+    };
+    let row = |row: usize| match row.is_multiple_of(samples.rate) {
+        true => seen(row).max(known(row)),
+        false => seen(row),
+    };
+    (0..at.nrows())
+        .map(|sample| row(sample).clamp(1.0, GROWTH))
+        .collect()
 }

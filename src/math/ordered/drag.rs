@@ -84,7 +84,7 @@ impl Drag {
                     sites,
                     ..plate.clone()
                 };
-                Draft::of(controls, plate).refined(samples, curve, pins, QUICK, task)?
+                Draft::of(samples, controls, plate).refined(samples, curve, pins, QUICK, task)?
             }
             false => Draft::at(samples, curve, controls, &sites),
         };

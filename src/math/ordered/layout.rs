@@ -1,37 +1,26 @@
-//! Layouts that respect the order: from unrolled, where only consecutive samples and returning poses
-//! are near, towards plain distances, as far as the motion between the frames allows.
+//! Layouts that respect the order: unrolled, where only consecutive samples and returning poses are near,
+//! and halfway from there to plain distances.
 //!
 //! D0 are the distances of the samples, G those along the order graph with reach tau times their root
 //! mean square. A layout minimises the stress of D = D0^(1-theta) G^theta with weights
-//! 1/(D + eps max D)^2. Whether it is *accepted* depends on how well a curve and a plate of fixed
-//! fidelity (k = .8n, l = .6n) over it meet the motion at samples that were not fitted; nothing here
-//! depends on the fidelity that is asked for, so that the choice does not change with it.
+//! 1/(D + eps max D)^2. Nothing here depends on the fidelity that is asked for.
 
 use faer::{Mat, MatRef};
-use rayon::prelude::*;
 
-use super::refine::unrefined;
-use super::samples::{Curve, Samples, mean, rows};
+use super::samples::{Samples, mean, rows};
 use crate::math::b_spline::Point;
 use crate::math::layout::{Distances, Stop, majorise, to_principal_axes, turned_to};
 use crate::math::order_graph::geodesics;
 use crate::math::symmetric;
 use crate::task::{Cancelled, Task};
 
-/// Reaches of the order graph, in root mean square distances. Each is half the one before: neighbours
-/// are so different that a little more or less of the motion seldom changes which one is chosen.
-const REACHES: [f64; 5] = [0.2, 0.1, 0.05, 0.025, 0.0];
-/// The walk from geodesic (1) to plain distances (0), coarse for the same reason.
-const WALK: [f64; 2] = [HALFWAY, 0.0];
+/// Reaches of the order graph, in root mean square distances. They are few and far apart, so that a
+/// little more or less of the motion seldom changes which one is chosen.
+pub(super) const REACHES: [f64; 3] = [0.1, 0.025, 0.0];
+/// Between unrolled (1) and plain distances (0), where most motions show their shape and hide no saddle.
 const HALFWAY: f64 = 0.5;
-/// A layout is accepted up to so many times the best score found,
-const WORSE: f64 = 1.5;
-/// .. or up to so many times what the modes leave out.
-const FLOORS: f64 = 0.75;
-/// .. or up to so many steps between frames in root mean square: refinement makes that invisible.
-const STEPS: f64 = 0.05;
-/// So many candidates are worth refining.
-const CANDIDATES: usize = 6;
+/// Distances along two graphs that differ by less than this part are the same map.
+const SAME: f64 = 0.01;
 /// Softening of the weights, of the largest distance.
 const SOFTENING: f64 = 0.02;
 /// The stress need not be exact: refinement moves the curve anyway.
@@ -42,7 +31,7 @@ const STOP: Stop = Stop {
 /// Noise on the start, of its spread: it takes straight layouts off their line.
 const NOISE: f64 = 1e-3;
 
-/// Which layout: how far apart returning poses may be to be joined, and how far the walk went.
+/// Which layout: how far apart returning poses may be to be joined, and how far it is from unrolled.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Choice {
     /// Reach of the order graph, in root mean square distances; 0 joins consecutive samples only.
@@ -57,9 +46,7 @@ pub(super) struct Candidate {
     pub(super) choice: Choice,
     pub(super) layout: Mat<f64>,
     /// Its radius before it was made 1, in units of the motion.
-    natural: f64,
-    /// Deviation at the check samples, as a norm.
-    score: f64,
+    pub(super) natural: f64,
 }
 
 /// The distances that layouts are made from.
@@ -80,27 +67,66 @@ impl Order {
         }
     }
 
-    /// D of a choice.
-    fn targets(&self, choice: Choice) -> Distances {
-        blend(
-            &self.plain,
-            &self.graph(choice.tau),
-            choice.theta,
-            1e-9 * self.radius,
-        )
-    }
-
-    fn graph(&self, tau: f64) -> Distances {
+    /// Distances along the graph of a reach.
+    pub(super) fn graph(&self, tau: f64) -> Distances {
         geodesics(&self.plain, tau * self.radius)
     }
 
-    /// How many pairs a reach joins.
-    fn joined(&self, tau: f64) -> usize {
-        let reach = tau * self.radius;
-        self.plain.values().iter().filter(|&&d| d < reach).count()
+    /// D of a theta.
+    fn targets(&self, graph: &Distances, theta: f64) -> Distances {
+        blend(&self.plain, graph, theta, 1e-9 * self.radius)
     }
 
-    /// A candidate with its samples `pins` where they belong. Without a score of its own.
+    /// The layout of a choice over its graph, reached by way of those that are more unrolled; these
+    /// before it.
+    pub(super) fn walk(
+        &self,
+        choice: Choice,
+        graph: &Distances,
+        task: &Task,
+    ) -> Result<Vec<Candidate>, Cancelled> {
+        let mut walk = vec![candidate(
+            Choice {
+                theta: 1.0,
+                ..choice
+            },
+            graph,
+            &classical(graph),
+            task,
+        )?];
+        for theta in [HALFWAY, choice.theta] {
+            let last = &walk[walk.len() - 1];
+            if theta < last.choice.theta && theta >= choice.theta {
+                let start = points(last.layout.as_ref());
+                let targets = self.targets(graph, theta);
+                walk.push(candidate(
+                    Choice { theta, ..choice },
+                    &targets,
+                    &start,
+                    task,
+                )?);
+            }
+        }
+        Ok(walk)
+    }
+
+    /// What is worth trying of a reach, the better map first: halfway, then unrolled.
+    pub(super) fn candidates(
+        &self,
+        tau: f64,
+        graph: &Distances,
+        task: &Task,
+    ) -> Result<Vec<Candidate>, Cancelled> {
+        let halfway = Choice {
+            tau,
+            theta: HALFWAY,
+        };
+        let mut walk = self.walk(halfway, graph, task)?;
+        walk.reverse();
+        Ok(walk)
+    }
+
+    /// A candidate with its samples `pins` where they belong.
     pub(super) fn pinned(
         &self,
         candidate: &Candidate,
@@ -110,7 +136,8 @@ impl Order {
         if pins.is_empty() {
             return Ok(candidate.clone());
         }
-        let targets = self.targets(candidate.choice);
+        let Choice { tau, theta } = candidate.choice;
+        let targets = self.targets(&self.graph(tau), theta);
         let mut values = targets.values().iter();
         let targets = Distances::from_fn(targets.count(), |_, _| {
             values.next().unwrap_or(&0.0) / candidate.natural
@@ -123,11 +150,38 @@ impl Order {
     }
 }
 
-impl Candidate {
-    /// Its radius in units of the motion.
-    pub(super) fn natural(&self) -> f64 {
-        self.natural
-    }
+/// Whether distances along two graphs are nearly the same.
+pub(super) fn alike(one: &Distances, other: &Distances) -> bool {
+    let pairs = one.values().iter().zip(other.values());
+    let apart: f64 = pairs.map(|(a, b)| (a - b) * (a - b)).sum();
+    let whole: f64 = one.values().iter().map(|a| a * a).sum();
+    apart <= SAME * SAME * whole
+}
+
+/// The layout of least stress near `start`.
+fn candidate(
+    choice: Choice,
+    targets: &Distances,
+    start: &[Point],
+    task: &Task,
+) -> Result<Candidate, Cancelled> {
+    let size = radius(start);
+    // The mean squared distance is twice the squared radius.
+    let scale = match size > 0.0 {
+        true => root_mean_square(targets) / (2f64.sqrt() * size),
+        false => 1.0,
+    };
+    let start: Vec<Point> = start.iter().map(|p| p.map(|x| scale * x)).collect();
+    let mut found = least_stress(targets, &start, &[], &STOP, task)?;
+    to_principal_axes(&mut found);
+    let natural = Some(radius(&found))
+        .filter(|&size| size > 0.0)
+        .unwrap_or(1.0);
+    Ok(Candidate {
+        choice,
+        layout: Mat::from_fn(found.len(), 2, |i, a| found[i][a] / natural),
+        natural,
+    })
 }
 
 /// Points (n x 2) that keep their `distances` as far as `pins` allow, from where they are: none as they
@@ -146,168 +200,6 @@ pub(super) fn held(
         _ => least_stress(distances, &turned_to(pins, &start), pins, stop, task)?,
     };
     Ok(Mat::from_fn(moved.len(), 2, |i, a| moved[i][a]))
-}
-
-/// Lays the motion out unrolled for each reach, walks from the largest accepted one, and returns what
-/// is worth refining in the order in which it should be tried: the end of the walk, its start, then the
-/// unrolled ones of the least scores, each after what lies halfway from it. Never empty.
-pub(super) fn candidates(
-    order: &Order,
-    samples: &Samples,
-    floor: f64,
-    task: &Task,
-) -> Result<Vec<Candidate>, Cancelled> {
-    let scale = Scale::new(samples);
-    let mut unrolled = unrolled(order, &scale, task)?;
-    let tolerated = (FLOORS * floor * samples.spread)
-        .max(STEPS * samples.step * (samples.finer.nrows() as f64).sqrt());
-    let least = unrolled
-        .iter()
-        .map(|one| one.score)
-        .fold(f64::INFINITY, f64::min);
-    let accepts = |score: f64, least: f64| score <= (WORSE * least).max(tolerated);
-    let first = unrolled
-        .iter()
-        .position(|one| accepts(one.score, least))
-        .unwrap_or(0);
-    let mut worth = walk(order, &scale, &unrolled[first], least, &accepts, task)?;
-    worth.reverse();
-    if worth.len() > 1 {
-        worth.drain(1..worth.len() - 1);
-    }
-    unrolled.remove(first);
-    unrolled.sort_by(|a, b| a.score.total_cmp(&b.score));
-    for one in unrolled.into_iter().take((CANDIDATES - worth.len()) / 2) {
-        worth.push(halfway(order, &scale, &one, task)?);
-        worth.push(one);
-    }
-    Ok(worth)
-}
-
-/// The layout of a choice, reached as the search would: unrolled first, then walked.
-pub(super) fn known(
-    order: &Order,
-    samples: &Samples,
-    choice: Choice,
-    task: &Task,
-) -> Result<Candidate, Cancelled> {
-    let scale = Scale::new(samples);
-    let tau = choice.tau;
-    let graph = order.graph(tau);
-    let unrolled = Choice { tau, theta: 1.0 };
-    let mut candidate = scale.candidate(unrolled, &graph, &classical(&graph), task)?;
-    for theta in WALK.into_iter().filter(|&theta| theta >= choice.theta) {
-        let targets = blend(&order.plain, &graph, theta, 1e-9 * order.radius);
-        let start = points(candidate.layout.as_ref());
-        candidate = scale.candidate(Choice { tau, theta }, &targets, &start, task)?;
-    }
-    Ok(candidate)
-}
-
-/// theta = 1 for every reach that joins other pairs than the one before.
-fn unrolled(order: &Order, scale: &Scale<'_>, task: &Task) -> Result<Vec<Candidate>, Cancelled> {
-    let mut reaches = REACHES.to_vec();
-    reaches.dedup_by_key(|tau| order.joined(*tau));
-    reaches
-        .par_iter()
-        .map(|&tau| {
-            task.check()?;
-            let graph = order.graph(tau);
-            let start = classical(&graph);
-            let candidate = scale.candidate(Choice { tau, theta: 1.0 }, &graph, &start, task)?;
-            task.step();
-            Ok(candidate)
-        })
-        .collect()
-}
-
-/// From `first` towards plain distances, as far as it is accepted; `first` included.
-fn walk(
-    order: &Order,
-    scale: &Scale<'_>,
-    first: &Candidate,
-    mut least: f64,
-    accepts: &dyn Fn(f64, f64) -> bool,
-    task: &Task,
-) -> Result<Vec<Candidate>, Cancelled> {
-    let tau = first.choice.tau;
-    let graph = order.graph(tau);
-    let mut walk = vec![first.clone()];
-    for theta in WALK {
-        task.check()?;
-        let targets = blend(&order.plain, &graph, theta, 1e-9 * order.radius);
-        let start = points(walk[walk.len() - 1].layout.as_ref());
-        let next = scale.candidate(Choice { tau, theta }, &targets, &start, task)?;
-        task.step();
-        least = least.min(next.score);
-        if !accepts(next.score, least) {
-            break;
-        }
-        walk.push(next);
-    }
-    Ok(walk)
-}
-
-/// Halfway from an unrolled layout to plain distances.
-fn halfway(
-    order: &Order,
-    scale: &Scale<'_>,
-    unrolled: &Candidate,
-    task: &Task,
-) -> Result<Candidate, Cancelled> {
-    let choice = Choice {
-        theta: HALFWAY,
-        ..unrolled.choice
-    };
-    let start = points(unrolled.layout.as_ref());
-    scale.candidate(choice, &order.targets(choice), &start, task)
-}
-
-/// What scores a layout.
-struct Scale<'a> {
-    samples: &'a Samples,
-    curve: Curve,
-    sites: usize,
-}
-
-impl<'a> Scale<'a> {
-    fn new(samples: &'a Samples) -> Self {
-        Scale {
-            samples,
-            curve: samples.curve(samples.usual_controls()),
-            sites: samples.usual_sites(),
-        }
-    }
-
-    /// The layout of least stress near `start`, scored.
-    fn candidate(
-        &self,
-        choice: Choice,
-        targets: &Distances,
-        start: &[Point],
-        task: &Task,
-    ) -> Result<Candidate, Cancelled> {
-        let size = radius(start);
-        // The mean squared distance is twice the squared radius.
-        let scale = match size > 0.0 {
-            true => root_mean_square(targets) / (2f64.sqrt() * size),
-            false => 1.0,
-        };
-        let start: Vec<Point> = start.iter().map(|p| p.map(|x| scale * x)).collect();
-        let mut found = least_stress(targets, &start, &[], &STOP, task)?;
-        to_principal_axes(&mut found);
-        let natural = Some(radius(&found))
-            .filter(|&size| size > 0.0)
-            .unwrap_or(1.0);
-        let layout = Mat::from_fn(found.len(), 2, |i, a| found[i][a] / natural);
-        let between = unrefined(self.samples, &self.curve, layout.as_ref(), self.sites);
-        Ok(Candidate {
-            choice,
-            layout,
-            natural,
-            score: (&self.samples.finer - between).norm_l2(),
-        })
-    }
 }
 
 /// Positions of least relative stress near `start`, the pins held.

@@ -27,6 +27,7 @@ use self::layout::{Candidate, Order};
 use self::refine::{Draft, LOOSE, firm};
 use self::samples::{Curve, Samples};
 use super::b_spline::Point;
+use super::layout::Distances;
 use super::variable_projection::Plate;
 use crate::task::{Cancelled, Task};
 
@@ -34,12 +35,19 @@ pub use check::Quality;
 pub use drag::{Drag, Moving};
 pub use layout::Choice;
 
-/// A later candidate is taken only where it costs so many times less: the earlier ones are better maps,
-/// and a choice between equals would change with every frame more.
-const CLEARLY: f64 = 0.8;
+/// A layout is given up for one that promises so many times less deviation: those before it are better
+/// maps, and a choice between near equals would change with every frame more.
+const CLEARLY: f64 = 1.75;
+/// The same for a fit that has a spike: the layout must not depend on the fidelity, unless it ruins a fit.
+const RUINED: f64 = 3.0;
 
-/// So many rounds more are spent on a fit that is not yet right.
-const AGAIN: usize = 4;
+/// Rounds of refinement that a fit which is not yet right is given, times its frames squared; at least and at
+/// most so many.
+const ROUNDS: usize = 120_000;
+const FEW: usize = 4;
+const MANY: usize = 48;
+/// So many rounds one after the other that do not help are the last.
+const IDLE: usize = 8;
 
 /// Fidelity of an ordered fit.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -73,40 +81,39 @@ pub struct Fit {
     pub converged: bool,
 }
 
-/// A motion with its samples, and the layouts that are worth refining.
+/// A motion with its samples, and the layout that is refined first.
 #[derive(Debug, Clone)]
 pub struct Motion {
+    ground: Ground,
+    chosen: Trial,
+}
+
+/// What is fitted.
+#[derive(Debug, Clone)]
+struct Ground {
     frames: Mat<f64>,
     floor: f64,
     samples: Samples,
     order: Order,
-    candidates: Vec<Candidate>,
-    /// The candidate that is refined first, and what it was at the usual fidelity.
-    chosen: usize,
-    trial: Option<Draft>,
+}
+
+/// A layout and what it promises: a short refinement at the usual fidelity (k = .8n, l = .6n).
+#[derive(Debug, Clone)]
+struct Trial {
+    candidate: Candidate,
+    draft: Draft,
+    quality: Quality,
 }
 
 impl Motion {
     /// Lays out `frames` (n x m, n >= 3, m >= 1, not all equal) and chooses a layout: the first that a
-    /// short refinement at the usual fidelity (k = .8n, l = .6n) makes good. `floor` is what the m
-    /// coordinates leave out of the motion, relative to its spread.
+    /// short refinement at the usual fidelity makes good, or else the first that is not clearly worse than
+    /// another. `floor` is what the m coordinates leave out of the motion, relative to its spread.
     ///
     /// # Errors
     /// The task was cancelled.
     pub fn new(frames: MatRef<'_, f64>, floor: f64, task: &Task) -> Result<Self, Cancelled> {
-        let samples = Samples::new(frames);
-        let order = Order::new(&samples);
-        let mut motion = Motion {
-            candidates: layout::candidates(&order, &samples, floor, task)?,
-            frames: frames.to_owned(),
-            floor,
-            samples,
-            order,
-            chosen: 0,
-            trial: None,
-        };
-        motion.choose(task)?;
-        Ok(motion)
+        Ground::new(frames, floor).chosen(task)
     }
 
     /// The same, but with a layout chosen `before` (for other fidelity, or nearly the same frames) kept
@@ -120,38 +127,30 @@ impl Motion {
         before: Choice,
         task: &Task,
     ) -> Result<Self, Cancelled> {
-        let samples = Samples::new(frames);
-        let order = Order::new(&samples);
-        let mut motion = Motion {
-            candidates: vec![layout::known(&order, &samples, before, task)?],
-            frames: frames.to_owned(),
-            floor,
-            samples,
-            order,
-            chosen: 0,
-            trial: None,
-        };
-        let quality = motion.choose(task)?;
-        if quality.is_some_and(|quality| !quality.spiked) {
-            return Ok(motion);
+        let ground = Ground::new(frames, floor);
+        let graph = ground.order.graph(before.tau);
+        let walked = ground.order.walk(before, &graph, task)?.pop();
+        let trial = walked.map(|candidate| ground.tried(candidate, task));
+        match trial.transpose()? {
+            Some(chosen) if !chosen.quality.spiked => Ok(Motion { ground, chosen }),
+            _ => ground.chosen(task),
         }
-        Motion::new(frames, floor, task)
     }
 
     /// The chosen layout at the frames, n x 2, before any pins.
     pub fn layout(&self) -> Mat<f64> {
-        self.samples
-            .frames_of(self.candidates[self.chosen].layout.as_ref())
+        let layout = self.chosen.candidate.layout.as_ref();
+        self.ground.samples.frames_of(layout)
     }
 
     /// Its radius, the unit of the plane, in units of the motion.
     pub fn radius(&self) -> f64 {
-        self.candidates[self.chosen].natural()
+        self.chosen.candidate.natural
     }
 
     /// Which layout it is.
     pub fn choice(&self) -> Choice {
-        self.candidates[self.chosen].choice
+        self.chosen.candidate.choice
     }
 
     /// The full fit.
@@ -159,62 +158,118 @@ impl Motion {
     /// # Errors
     /// The task was cancelled.
     pub fn fit(&self, options: &Options, task: &Task) -> Result<Fit, Cancelled> {
-        let first = self.finish(self.chosen, options, task)?;
+        let ground = &self.ground;
+        let first = ground.finished(&self.chosen.candidate, self.begun(options), options, task)?;
         if !first.quality.spiked || !options.pins.is_empty() {
             return Ok(first);
         }
-        let mut best = self.despiked(first, options, task)?;
-        for candidate in self.chosen + 1..self.candidates.len() {
-            if !best.quality.spiked {
-                break;
+        let mut best = ground.despiked(first, options, task)?;
+        ground.visit(task, |candidate| {
+            if best.quality.spiked && candidate.choice != self.choice() {
+                let other = ground.finished(&candidate, None, options, task)?;
+                if RUINED * other.quality.cost() < best.quality.cost() {
+                    best = other;
+                }
             }
-            let other = self.finish(candidate, options, task)?;
-            if !other.quality.spiked || other.quality.between < 0.7 * best.quality.between {
-                best = other;
-            }
-        }
+            Ok(best.quality.spiked)
+        })?;
         Ok(best)
     }
 
-    /// Chooses the first candidate that promises to become good; the best of them where none does.
-    /// Returns how good it is.
-    fn choose(&mut self, task: &Task) -> Result<Option<Quality>, Cancelled> {
-        let samples = &self.samples;
-        let curve = samples.curve(samples.usual_controls());
-        let mut chosen: Option<Quality> = None;
-        for (index, candidate) in self.candidates.iter().enumerate() {
-            let draft = Draft::over(samples, &curve, samples.usual_sites(), candidate, &[])
-                .refined(samples, &curve, &[], LOOSE, task)?;
-            let quality = draft.quality(samples, &curve, self.floor);
-            task.step();
-            // The earlier ones are better maps: they are kept unless another is clearly better.
-            if quality.promising || chosen.is_none_or(|best| quality.cost() < CLEARLY * best.cost())
-            {
-                chosen = Some(quality);
-                self.chosen = index;
-                self.trial = Some(draft);
-            }
-            if quality.promising {
-                break;
-            }
+    /// The trial's curve and plate, where they are what `options` ask for.
+    fn begun(&self, options: &Options) -> Option<&Draft> {
+        let draft = &self.chosen.draft;
+        let size = (draft.controls.nrows(), draft.plate.sites.nrows());
+        let asked = (options.controls, options.sites);
+        Some(draft).filter(|_| options.pins.is_empty() && size == asked)
+    }
+}
+
+impl Ground {
+    fn new(frames: MatRef<'_, f64>, floor: f64) -> Self {
+        let samples = Samples::new(frames);
+        Ground {
+            frames: frames.to_owned(),
+            floor,
+            order: Order::new(&samples),
+            samples,
         }
-        Ok(chosen)
     }
 
-    /// Refines one candidate at the wanted fidelity.
-    fn finish(&self, index: usize, options: &Options, task: &Task) -> Result<Fit, Cancelled> {
+    /// Shows `visitor` what is worth trying, the better maps first, as long as it returns true.
+    fn visit(
+        &self,
+        task: &Task,
+        mut visitor: impl FnMut(Candidate) -> Result<bool, Cancelled>,
+    ) -> Result<(), Cancelled> {
+        let mut graphs: Vec<Distances> = Vec::new();
+        for tau in layout::REACHES {
+            let graph = self.order.graph(tau);
+            if graphs.iter().any(|before| layout::alike(before, &graph)) {
+                continue;
+            }
+            for candidate in self.order.candidates(tau, &graph, task)? {
+                if !visitor(candidate)? {
+                    return Ok(());
+                }
+            }
+            graphs.push(graph);
+        }
+        Ok(())
+    }
+
+    /// The motion with the first candidate that promises to become good, or else the first that is not
+    /// clearly worse than another.
+    fn chosen(self, task: &Task) -> Result<Motion, Cancelled> {
+        let mut trials: Vec<Trial> = Vec::new();
+        self.visit(task, |candidate| {
+            trials.push(self.tried(candidate, task)?);
+            Ok(!trials[trials.len() - 1].quality.promising)
+        })?;
+        let costs = trials.iter().map(|trial| trial.quality.cost());
+        let least = costs.fold(f64::INFINITY, f64::min);
+        let close =
+            |trial: &Trial| trial.quality.promising || trial.quality.cost() <= CLEARLY * least;
+        let first = trials.iter().position(close).unwrap_or(0);
+        let chosen = trials.swap_remove(first);
+        Ok(Motion {
+            ground: self,
+            chosen,
+        })
+    }
+
+    fn tried(&self, candidate: Candidate, task: &Task) -> Result<Trial, Cancelled> {
+        let samples = &self.samples;
+        let curve = samples.curve(samples.usual_controls());
+        let draft = Draft::over(samples, &curve, samples.usual_sites(), &candidate, &[]).refined(
+            samples,
+            &curve,
+            &[],
+            LOOSE,
+            task,
+        )?;
+        task.step();
+        Ok(Trial {
+            quality: draft.quality(samples, &curve, self.floor),
+            candidate,
+            draft,
+        })
+    }
+
+    /// Refines one candidate at the wanted fidelity, from where a trial has `begun` if one has.
+    fn finished(
+        &self,
+        candidate: &Candidate,
+        begun: Option<&Draft>,
+        options: &Options,
+        task: &Task,
+    ) -> Result<Fit, Cancelled> {
         let (samples, pins) = (&self.samples, &options.pins[..]);
         let curve = samples.curve(options.controls);
         let sample_pins = samples.layout_pins(pins);
-        let candidate = self
-            .order
-            .pinned(&self.candidates[index], &sample_pins, task)?;
-        let begun = self.trial.as_ref().filter(|trial| {
-            let size = (trial.controls.nrows(), trial.plate.sites.nrows());
-            index == self.chosen && pins.is_empty() && size == (options.controls, options.sites)
-        });
+        let candidate = self.order.pinned(candidate, &sample_pins, task)?;
         let draft = match begun {
-            Some(trial) => trial.clone(),
+            Some(draft) => draft.clone(),
             None => Draft::over(samples, &curve, options.sites, &candidate, pins)
                 .refined(samples, &curve, pins, LOOSE, task)?,
         };
@@ -224,8 +279,8 @@ impl Motion {
         Ok(self.fitted(draft, &curve, &candidate))
     }
 
-    /// Refined to the end: once more, held less firmly, as long as frames or what lies between them are
-    /// not met and that helps.
+    /// Refined to the end, held less firmly: as long as more than allowed is missed somewhere and it helps
+    /// that this counts more.
     fn firm(
         &self,
         draft: Draft,
@@ -234,20 +289,23 @@ impl Motion {
         task: &Task,
     ) -> Result<Draft, Cancelled> {
         let (samples, round) = (&self.samples, firm(self.samples.frames));
-        let mut draft = draft.refined(samples, curve, pins, round, task)?;
-        for _ in 0..AGAIN {
-            let before = draft.quality(samples, curve, self.floor);
-            if before.is_settled(self.floor) {
+        let mut best = draft.refined(samples, curve, pins, round, task)?;
+        let mut excess = best.quality(samples, curve, self.floor).excess;
+        let (mut next, mut idle) = (best.clone(), 0);
+        for _ in 0..(ROUNDS / (samples.frames * samples.frames)).clamp(FEW, MANY) {
+            if excess <= 1.0 || idle == IDLE {
                 break;
             }
-            let next = draft.clone().refined(samples, curve, pins, round, task)?;
-            let after = next.quality(samples, curve, self.floor);
-            if after.between >= before.between && after.at_frames >= before.at_frames {
-                break;
+            next = next
+                .reweighted(samples, curve, self.floor)
+                .refined(samples, curve, pins, round, task)?;
+            let after = next.quality(samples, curve, self.floor).excess;
+            idle += 1;
+            if after < excess {
+                (best, excess, idle) = (next.clone(), after, 0);
             }
-            draft = next;
         }
-        Ok(draft)
+        Ok(best)
     }
 
     /// A spiked fit refined once more with twice as many samples: what was between them is now met.
@@ -280,7 +338,7 @@ impl Motion {
         Fit {
             quality: draft.quality(&self.samples, curve, self.floor),
             layout: self.samples.frames_of(candidate.layout.as_ref()),
-            radius: candidate.natural(),
+            radius: candidate.natural,
             choice: candidate.choice,
             controls: draft.controls,
             plate: draft.plate,
@@ -324,7 +382,7 @@ pub fn flat(frames: MatRef<'_, f64>, floor: f64, controls: usize) -> Fit {
     for a in 0..frames.ncols().min(2) {
         plate.affine[(1 + a, a)] = 1.0;
     }
-    let draft = Draft::of(controls, plate);
+    let draft = Draft::of(&samples, controls, plate);
     Fit {
         quality: draft.quality(&samples, &curve, floor),
         layout: leading(frames),

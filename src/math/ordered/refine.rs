@@ -1,8 +1,8 @@
 //! Refinement of one layout: curve and sites together, in rounds that hold on ever less firmly.
 
-use faer::{Mat, MatRef};
+use faer::Mat;
 
-use super::check::Quality;
+use super::check::{self, Quality};
 use super::layout::Candidate;
 use super::samples::{Curve, Samples};
 use crate::math::b_spline::Point;
@@ -16,6 +16,9 @@ const STRAYING: f64 = 0.05;
 /// What sites cost that stray by one radius each, of a round's first residual: without it some run
 /// tens of radii away and gain nothing.
 const SITE_STRAYING: f64 = 0.01;
+
+/// Frames nearer than this part of a step are the same.
+const AGAIN: f64 = 0.01;
 
 /// One round: how many evaluations, and what the curve's bending costs, of the round's first residual.
 /// Wiggles that buy nothing are smoothed away; later rounds must not be biased by it.
@@ -53,6 +56,8 @@ pub(super) struct Draft {
     /// Where the curve is held, k x 2, and whether it is.
     pub(super) anchor: Mat<f64>,
     pub(super) held: bool,
+    /// What each fitted sample's difference is multiplied by, N.
+    weights: Vec<f64>,
     pub(super) evaluations: usize,
     pub(super) converged: bool,
 }
@@ -69,6 +74,11 @@ impl Draft {
     ) -> Self {
         let points = samples.dense_layout(candidate.layout.as_ref());
         let controls = curve.fit(points.as_ref(), pins);
+        let met = met_again(samples, &samples.frames_on(curve, controls.as_ref()));
+        let controls = match pins {
+            [] => curve.through_pins(controls, &met),
+            _ => controls,
+        };
         let sites = curve.points_at(controls.as_ref(), &samples.site_times(sites));
         let mut draft = Draft::at(samples, curve, controls, &sites);
         draft.held = true;
@@ -86,12 +96,13 @@ impl Draft {
         let targets = samples.dense.as_ref();
         let (positions, weights) = (positions.as_ref(), &samples.weights);
         let plate = variable_projection::fit_plate(positions, targets, weights, sites.as_ref());
-        Draft::of(controls, plate)
+        Draft::of(samples, controls, plate)
     }
 
     /// A curve and a plate as they are; the curve is not held.
-    pub(super) fn of(controls: Mat<f64>, plate: Plate) -> Self {
+    pub(super) fn of(samples: &Samples, controls: Mat<f64>, plate: Plate) -> Self {
         Draft {
+            weights: samples.weights.clone(),
             anchor: controls.clone(),
             controls,
             plate,
@@ -135,7 +146,7 @@ impl Draft {
         let problem = Problem {
             spline,
             targets: samples.dense.as_ref(),
-            weights: &samples.weights,
+            weights: &self.weights,
             anchor: self.anchor.as_ref(),
             hold: hold.as_ref(),
             bending: bending.as_ref(),
@@ -163,15 +174,26 @@ impl Draft {
 
     /// How good it is at the samples and between them.
     pub(super) fn quality(&self, samples: &Samples, curve: &Curve, floor: f64) -> Quality {
-        let at = |design: &crate::math::uniform_spline::UniformDesign| {
-            self.plate.at(design.apply(self.controls.as_ref()).as_ref())
-        };
-        Quality::of(
-            samples,
-            &at(curve.fitted.design()),
-            &at(&curve.finer),
-            floor,
-        )
+        let [at, between] = self.values(curve);
+        Quality::of(samples, &at, &between, floor)
+    }
+
+    /// The same, but samples count more where more than allowed is missed.
+    pub(super) fn reweighted(mut self, samples: &Samples, curve: &Curve, floor: f64) -> Self {
+        let [at, between] = self.values(curve);
+        let growth = check::growth(samples, &at, &between, floor);
+        let weights = self.weights.iter_mut().zip(growth);
+        weights.for_each(|(weight, growth)| *weight *= growth);
+        let squares: f64 = self.weights.iter().map(|weight| weight * weight).sum();
+        let scale = (self.weights.len() as f64 / squares).sqrt();
+        self.weights.iter_mut().for_each(|weight| *weight *= scale);
+        self
+    }
+
+    /// g(f(t)) at the fitted and at the check samples.
+    fn values(&self, curve: &Curve) -> [Mat<f64>; 2] {
+        [curve.fitted.design(), &curve.finer]
+            .map(|design| self.plate.at(design.apply(self.controls.as_ref()).as_ref()))
     }
 }
 
@@ -184,18 +206,21 @@ fn second_differences(controls: usize) -> Mat<f64> {
     })
 }
 
-/// The plate over a layout without refinement, at the check samples: what scores layouts.
-pub(super) fn unrefined(
-    samples: &Samples,
-    curve: &Curve,
-    layout: MatRef<'_, f64>,
-    sites: usize,
-) -> Mat<f64> {
-    let points = samples.dense_layout(layout);
-    let controls = curve.fitted.fit(points.as_ref());
-    let sites = curve.points_at(controls.as_ref(), &samples.site_times(sites));
-    let draft = Draft::at(samples, curve, controls, &sites);
-    draft
-        .plate
-        .at(curve.finer.apply(draft.controls.as_ref()).as_ref())
+/// Where the first and the last frame belong that come again within the motion: `places` of those frames. The
+/// curve cuts corners on its way, but not at its ends.
+fn met_again(samples: &Samples, places: &Mat<f64>) -> Vec<(usize, Point)> {
+    let (last, rate) = (samples.frames - 1, samples.rate);
+    let same = |end: usize, frame: usize| {
+        let (one, other) = (
+            samples.dense.row(end * rate),
+            samples.dense.row(frame * rate),
+        );
+        (one - other).norm_l2() < AGAIN * samples.step
+    };
+    let met = |end: usize| {
+        let again =
+            (2..last.max(3) - 1).find(|&frame| end.abs_diff(frame) > 1 && same(end, frame))?;
+        Some((end, [places[(again, 0)], places[(again, 1)]]))
+    };
+    [0, last].into_iter().filter_map(met).collect()
 }
