@@ -184,7 +184,7 @@ fn halves() -> Vec<(String, Sequence)> {
         .iter()
         .filter(|demo| demo.kind == Kind::Motion && !demo.travels);
     let mut captures: Vec<(String, Sequence)> = demos
-        .map(|demo| (demo.name.to_string(), every_second(&(demo.generate)())))
+        .map(|demo| (demo.name.to_string(), every_second(&demo.generate())))
         .collect();
     captures.push(("strides".to_string(), strides()));
     captures.push(("swing".to_string(), swing(40)));
