@@ -19,6 +19,15 @@ const ANSWER: &[u8] = b"\x1b[6;20;10t\x1b[?62c";
 /// Bytes a second of a slow line.
 const SLOW: usize = 256 * 1024;
 
+/// Openings of a row.
+const OPENINGS: usize = 15;
+/// What pictures in half blocks consist of.
+const BLOCKS: [&str; 4] = ["▀", "▄", "▌", "▐"];
+/// How a kitty picture begins.
+const KITTY: &str = "\x1b_Ga=T";
+/// What a terminal that shows kitty pictures answers.
+const KITTY_ANSWER: &[u8] = b"\x1b_Gi=31;OK\x1b\\\x1b[6;20;10t\x1b[?62c";
+
 struct Studio {
     child: Box<dyn Child + Send + Sync>,
     keyboard: Box<dyn Write + Send>,
@@ -27,7 +36,21 @@ struct Studio {
 }
 
 impl Studio {
+    /// The studio on a terminal that has answered its questions.
     fn open(folder: &Path, arguments: &[&str], rate: Option<usize>) -> Self {
+        let mut studio = Self::start(folder, arguments, rate);
+        let mut asked = Vec::new();
+        while !contains(&asked, ASKED) {
+            let wait = Duration::from_secs(10);
+            let (_, part) = studio.sent.recv_timeout(wait).expect("questions");
+            asked.extend(part);
+        }
+        studio.keyboard.write_all(ANSWER).expect("an answer");
+        studio
+    }
+
+    /// The studio on a terminal that passes on so many bytes a second.
+    fn start(folder: &Path, arguments: &[&str], rate: Option<usize>) -> Self {
         let size = PtySize {
             rows: 36,
             cols: 120,
@@ -45,7 +68,7 @@ impl Studio {
         command.env_remove("TMUX");
         let child = pair.slave.spawn_command(command).expect("it starts");
         let mut output = pair.master.try_clone_reader().expect("its output");
-        let mut keyboard = pair.master.take_writer().expect("its keyboard");
+        let keyboard = pair.master.take_writer().expect("its keyboard");
         let (send, sent) = mpsc::channel();
         thread::spawn(move || {
             let mut bytes = [0; 4096];
@@ -61,14 +84,6 @@ impl Studio {
                 }
             }
         });
-        let mut studio_sent = Vec::new();
-        while !contains(&studio_sent, ASKED) {
-            let (_, part) = sent
-                .recv_timeout(Duration::from_secs(10))
-                .expect("questions");
-            studio_sent.extend(part);
-        }
-        keyboard.write_all(ANSWER).expect("an answer");
         Studio {
             child,
             keyboard,
@@ -143,6 +158,82 @@ impl Studio {
     }
 }
 
+/// Milliseconds from the start of the program until it has sent one of these texts, in a terminal that answers
+/// its questions so, or not at all.
+fn until(folder: &Path, arguments: &[&str], answer: &[u8], wanted: &[&str]) -> f64 {
+    let start = Instant::now();
+    let mut studio = Studio::start(folder, arguments, None);
+    let (mut all, mut asked) = (Vec::new(), false);
+    let there = |all: &[u8]| wanted.iter().any(|text| contains(all, text.as_bytes()));
+    let mut last = start;
+    while !there(&all) {
+        let wait = Duration::from_secs(60);
+        let (at, part) = studio.sent.recv_timeout(wait).expect("what is waited for");
+        (last, asked) = (at, {
+            all.extend(part);
+            if !asked && contains(&all, ASKED) {
+                studio.keyboard.write_all(answer).expect("an answer");
+                true
+            } else {
+                asked
+            }
+        });
+    }
+    let took = (last - start).as_secs_f64() * 1e3;
+    studio.quit();
+    took
+}
+
+/// How long the first picture takes.
+fn openings(folder: &Path, capture: &str) {
+    let loom = "first.loom";
+    let fitted = std::process::Command::new(env!("CARGO_BIN_EXE_meshloom"))
+        .args(["fit", capture, "-o", loom, "--quiet"])
+        .current_dir(folder)
+        .status();
+    assert!(fitted.is_ok_and(|status| status.success()), "a loom");
+    let rows: [(&str, &str, &[u8], &[&str]); 6] = [
+        (
+            "a loom opened, kitty: the first picture",
+            loom,
+            KITTY_ANSWER,
+            &BLOCKS,
+        ),
+        ("the same: in pixels", loom, KITTY_ANSWER, &[KITTY]),
+        (
+            "a loom opened, a terminal without pictures",
+            loom,
+            ANSWER,
+            &BLOCKS,
+        ),
+        ("a loom opened, a silent terminal", loom, b"", &BLOCKS),
+        (
+            "a capture opened: its first frame",
+            capture,
+            ANSWER,
+            &BLOCKS,
+        ),
+        ("the same: fitted", capture, ANSWER, &["k="]),
+    ];
+    println!(
+        "{:<44} {:>10} {:>10}",
+        "from the start of the program", "median", "9 of 10"
+    );
+    for (name, input, answer, wanted) in rows {
+        // A terminal that shows pixels at once may show no blocks before.
+        let wanted: Vec<&str> = if answer == KITTY_ANSWER {
+            wanted.iter().copied().chain([KITTY]).collect()
+        } else {
+            wanted.to_vec()
+        };
+        let once = |_| until(folder, &["open", input], answer, &wanted);
+        let mut times: Vec<f64> = (0..OPENINGS).map(once).collect();
+        times.sort_by(f64::total_cmp);
+        let at = |share: f64| times[((times.len() - 1) as f64 * share) as usize];
+        println!("{name:<44} {:>7.1} ms {:>7.1} ms", at(0.5), at(0.9));
+    }
+}
+
 fn contains(bytes: &[u8], wanted: &[u8]) -> bool {
     bytes.windows(wanted.len()).any(|part| part == wanted)
 }
@@ -192,10 +283,10 @@ fn main() {
         println!("skipped: no real captures");
         return;
     }
+    openings(folder.path(), &real);
     for graphics in ["blocks", "kitty"] {
         let arguments = ["open", &real, "--recipe", "r.rhai", "--graphics", graphics];
         let mut studio = Studio::open(folder.path(), &arguments, None);
-        studio.wait("frame");
         studio.wait("k=");
         studio.press("i");
         studio.silence(SILENCE);

@@ -231,6 +231,51 @@ fn answers_that_make_no_sense_are_no_answers_and_no_keys() {
 }
 
 #[test]
+fn the_first_picture_waits_for_no_answer_and_a_late_one_is_heard() {
+    let folder = folder();
+    let mut terminal = Terminal::open(folder.path(), &["open", "horse.loom"], &[]);
+    terminal.wait("\x1b[c");
+    terminal.wait("▄");
+    terminal.press("\x1b_Gi=31;OK\x1b\\\x1b[6;20;10t\x1b[?62c");
+    terminal.wait("\x1b_Ga=T");
+    terminal.settle();
+    assert!(terminal.child.try_wait().unwrap().is_none());
+    terminal.quit();
+}
+
+/// The last frame is a pipe: it is there once somebody writes it.
+#[cfg(unix)]
+#[test]
+fn a_captures_first_frame_is_shown_while_the_rest_still_loads() {
+    let folder = tempfile::tempdir().unwrap();
+    let capture = folder.path().join("bend");
+    std::fs::create_dir(&capture).unwrap();
+    let mesh = |height: f64| {
+        format!("v 0 0 0\nv 1 0 {height}\nv 1 1 0\nv 0 1 {height}\nf 1 2 3\nf 1 3 4\n")
+    };
+    for frame in 0..5 {
+        let file = capture.join(format!("f{frame}.obj"));
+        std::fs::write(file, mesh(0.1 * f64::from(frame))).unwrap();
+    }
+    let pipe = capture.join("f5.obj");
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+    assert!(made.unwrap().success());
+    let terminal = Terminal::open(folder.path(), &["open", "bend"], &[]);
+    // Half blocks: the mesh of the first frame, for nothing else can be known yet.
+    terminal.wait("▄");
+    terminal.see("frame 1.00/1 ");
+    // Who reads it again finds a file.
+    let file = folder.path().join("last");
+    std::fs::write(&file, mesh(0.5)).unwrap();
+    let mut writer = std::fs::OpenOptions::new().write(true).open(&pipe).unwrap();
+    std::fs::rename(&file, &pipe).unwrap();
+    writer.write_all(mesh(0.5).as_bytes()).unwrap();
+    drop(writer);
+    terminal.see("frame 1.00/6 ");
+    terminal.quit();
+}
+
+#[test]
 fn without_colours_none_are_sent() {
     let folder = folder();
     let none = [("NO_COLOR", "1")];

@@ -67,7 +67,7 @@ impl Progress {
         }
     }
 
-    /// Takes the bar away; what is printed next stands alone.
+    /// Takes the bar away for good; what is printed next stands alone.
     pub(super) fn end(&self) {
         if let View::Bar(bar) = &self.view {
             bar.end();
@@ -143,6 +143,8 @@ struct Bar {
     gone: Arc<Mutex<u64>>,
     /// Nothing is being done until the next phase.
     rests: AtomicBool,
+    /// The terminal is somebody else's: it does not come back.
+    over: AtomicBool,
 }
 
 impl Bar {
@@ -151,6 +153,7 @@ impl Bar {
             bar: ProgressBar::hidden(),
             gone: Arc::default(),
             rests: AtomicBool::new(false),
+            over: AtomicBool::new(false),
         };
         bar.come();
         bar
@@ -172,6 +175,9 @@ impl Bar {
     }
 
     fn phase(&self, name: &'static str, steps: usize) {
+        if self.over.load(Ordering::SeqCst) {
+            return;
+        }
         if self.rests.swap(false, Ordering::SeqCst) {
             self.come();
         }
@@ -190,14 +196,19 @@ impl Bar {
 
     fn rest(&self) {
         if !self.rests.swap(true, Ordering::SeqCst) {
-            self.end();
-            self.bar.set_draw_target(ProgressDrawTarget::hidden());
+            self.leave();
         }
     }
 
     fn end(&self) {
+        self.over.store(true, Ordering::SeqCst);
+        self.leave();
+    }
+
+    fn leave(&self) {
         *self.gone.lock().unwrap_or_else(PoisonError::into_inner) += 1;
         self.bar.finish_and_clear();
+        self.bar.set_draw_target(ProgressDrawTarget::hidden());
     }
 }
 

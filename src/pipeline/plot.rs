@@ -90,7 +90,7 @@ pub fn caption(loom: &Loom) -> String {
 }
 
 /// Map and time signals of f and g. What was `fitted` is shown where it still belongs to the frames: an
-/// edit that changes their number leaves positions f(i) and no errors.
+/// edit that changes their number, or leads the curve another way, leaves positions f(i) and no errors.
 pub fn series(time: &TimeSignal, pose: &PoseSignal, fitted: &Fitted) -> (PoseSpace, TimeSignals) {
     let n = time.frames();
     let times = dense_times(n);
@@ -98,7 +98,7 @@ pub fn series(time: &TimeSignal, pose: &PoseSignal, fitted: &Fitted) -> (PoseSpa
     let reached: Vec<Point> = (1..=n).filter_map(|i| time.at(i as f64)).collect();
     let speed = |&t: &f64| time.velocity(t).map(|[x, y]| x.hypot(y));
     let rho: Vec<f64> = times.iter().filter_map(|&t| parameter(time, t)).collect();
-    let known = fitted.positions.len() == n && time.warps().is_empty();
+    let known = time.warps().is_empty() && belong(fitted.positions, &reached);
     let frames = if known {
         fitted.positions.to_vec()
     } else {
@@ -138,6 +138,25 @@ pub fn series(time: &TimeSignal, pose: &PoseSignal, fitted: &Fitted) -> (PoseSpa
         ..PoseSpace::default()
     };
     (map, signals)
+}
+
+/// A curve farther from its frames than this share of their spread, root mean square, is no longer theirs: it
+/// was sketched, or runs backwards.
+const FARTHEST: f64 = 0.7;
+
+/// Whether the curve, which reaches these points at its frames, goes by the frames' positions.
+fn belong(positions: &[Point], reached: &[Point]) -> bool {
+    let squared = |a: &Point, b: &Point| (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2);
+    let count = positions.len() as f64;
+    let sum = |axis: usize| positions.iter().map(|p| p[axis]).sum::<f64>();
+    let mean = [0, 1].map(|axis| sum(axis) / count);
+    let spread: f64 = positions.iter().map(|p| squared(p, &mean)).sum();
+    let away: f64 = positions
+        .iter()
+        .zip(reached)
+        .map(|(p, f)| squared(p, f))
+        .sum();
+    positions.len() == reached.len() && away <= FARTHEST * FARTHEST * spread
 }
 
 /// Times in frames, every frame among them.
@@ -215,6 +234,7 @@ pub fn figure(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::edit::{Edit, Sketch};
     use crate::loom::report::{Held, Mend};
     use crate::loom::test_looms::ring;
     use crate::math::thin_plate::Rows;
@@ -266,6 +286,27 @@ mod tests {
         }
         assert_eq!(plots.rho.len(), plots.times.len());
         assert_eq!(plots.error.len(), 12);
+    }
+
+    #[test]
+    fn frames_that_the_curve_has_left_are_not_linked_to_it() {
+        let loom = ring(20, 15, false);
+        let sketched = Edit::Path {
+            points: vec![[0.1, 0.0], [0.2, 0.1], [0.1, 0.2]],
+            sketch: Sketch::Through,
+            frames: None,
+        };
+        let moved = Edit::MoveControl {
+            control: 4,
+            to: [0.2, 0.1],
+        };
+        let drawn = |edit: &Edit| plot_loom(&edit.apply(&loom).unwrap().output).0;
+        for edit in [sketched, Edit::Reverse] {
+            let map = drawn(&edit);
+            assert_eq!((map.frames.len(), &map.frames), (15, &map.reached));
+            assert!(map.pins.is_empty());
+        }
+        assert_eq!(drawn(&moved).frames, loom.layout().positions);
     }
 
     #[test]

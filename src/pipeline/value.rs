@@ -95,6 +95,8 @@ pub struct Source {
     pub frames: Frames,
     /// What was asked of the fit.
     pub request: FitRequest,
+    /// What it gave, before all edits.
+    pub fitted: Arc<Loom>,
 }
 
 impl std::fmt::Debug for LoomValue {

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use ratatui::crossterm::event::{KeyEvent, MouseEvent};
 
+use super::graphics::Choice;
 use super::hands::{Errand, Reply};
 use super::state::{Content, Same};
 use super::thumbs::{Thumb, ThumbWish};
@@ -23,6 +24,8 @@ pub(super) enum Event {
     Resize(u16, u16),
     /// Time has passed since the last tick.
     Tick(Duration),
+    /// Nothing has happened for a moment since something moved.
+    Still,
     /// A worker has an answer.
     Answer(Answer),
     /// A signal asks the program to end.
@@ -32,6 +35,8 @@ pub(super) enum Event {
 /// What workers answer. Pictures carry the number of the question, so that old ones can be dropped.
 #[derive(Debug)]
 pub(super) enum Answer {
+    /// What the terminal can show, and whether its background is dark.
+    Terminal(Box<Choice>, bool),
     /// What is open: first a single frame, then the capture, then the loom.
     Opened(Box<Content>, Vec<Diagnostic>),
     /// Work goes on: the phase, steps done, and of how many (0: not known).
@@ -82,6 +87,8 @@ pub(super) enum Command {
     Export(super::state::Span),
     /// What the hands ask for.
     Hands(Errand),
+    /// Pictures are shown so from now on.
+    Present(Box<Choice>),
     /// The terminal is cleared and drawn anew.
     Redraw,
     /// The program is stopped until it is called back.

@@ -202,8 +202,10 @@ pub(super) fn named(key: KeyEvent) -> Option<String> {
 /// or BEL.
 #[derive(Debug, Default)]
 pub(super) struct LateAnswer {
-    /// Keys of an answer so far.
-    taken: Option<usize>,
+    /// An answer so far.
+    taken: Option<String>,
+    /// One that is complete.
+    whole: Option<String>,
 }
 
 /// No answer is longer.
@@ -214,18 +216,28 @@ impl LateAnswer {
     pub(super) fn takes(&mut self, key: KeyEvent) -> bool {
         let escaped = key.modifiers.contains(KeyModifiers::ALT);
         let bell = key.code == KeyCode::Char('g') && key.modifiers == KeyModifiers::CONTROL;
-        match (self.taken, key.code) {
-            (None, KeyCode::Char(']' | '_' | 'P')) if escaped => self.taken = Some(1),
-            (None, _) => return false,
-            (Some(_), KeyCode::Char('\\')) if escaped => self.taken = None,
-            (Some(_), _) if bell => self.taken = None,
-            (Some(LONGEST_ANSWER..), _) => {
-                self.taken = None;
+        let Some(mut taken) = self.taken.take() else {
+            let KeyCode::Char(first @ (']' | '_' | 'P')) = key.code else {
                 return false;
+            };
+            self.taken = escaped.then(|| format!("\x1b{first}"));
+            return escaped;
+        };
+        match key.code {
+            KeyCode::Char('\\') if escaped => self.whole = Some(taken + "\x1b\\"),
+            _ if bell => self.whole = Some(taken + "\x07"),
+            _ if taken.len() > LONGEST_ANSWER => return false,
+            code => {
+                taken.extend(code.as_char());
+                self.taken = Some(taken);
             }
-            (Some(taken), _) => self.taken = Some(taken + 1),
         }
         true
+    }
+
+    /// The answer that has just come to its end, as the terminal sent it; once.
+    pub(super) fn answer(&mut self) -> Option<String> {
+        self.whole.take()
     }
 }
 
@@ -309,6 +321,12 @@ mod tests {
                     .all(|letter| late.takes(key(letter, none)))
             );
             assert!(late.takes(end));
+            let answer = late.answer().unwrap();
+            assert!(
+                answer.starts_with(&format!("\x1b{start}11;rgb:0000/")),
+                "{answer:?}"
+            );
+            assert!(answer.ends_with(['\\', '\x07']) && late.answer().is_none());
             assert!(!late.takes(key('q', none)));
         }
         let mut late = LateAnswer::default();

@@ -27,6 +27,7 @@ mod studio;
 mod terminal;
 mod theme;
 mod thumbs;
+mod typed;
 mod update;
 mod wire;
 mod work;

@@ -127,63 +127,109 @@ fn waiting(state: &State, index: usize) -> &'static str {
 fn draw_status(state: &State, buffer: &mut Buffer) {
     let row = buffer.area.height - 1;
     let area = Rect::new(0, row, buffer.area.width, 1);
-    let muted = state.look.style(Role::Muted);
+    let mut parts = place_words(state);
+    parts.extend(loom_words(state));
+    parts.extend(panels::posed_words(state).map(|words| (2, Span::raw(words))));
+    parts.extend(happening(state).into_iter().map(|span| (0, span)));
+    Paragraph::new(Line::from(fitting(parts, usize::from(area.width))))
+        .style(state.look.bar())
+        .render(area, buffer);
+}
+
+/// A part of the status line: where there is no room for all, those of the highest number go first; 0 stays.
+type Part = (u8, Span<'static>);
+
+/// What is open, and where in it we are.
+fn place_words(state: &State) -> Vec<Part> {
     let playback = &state.playback;
-    let mut spans = vec![
-        Span::styled(
-            match (playback.playing, state.plain_letters) {
-                (true, false) => " ▶ ",
-                (false, false) => " ∎ ",
-                (true, true) => " > ",
-                (false, true) => " . ",
-            },
-            state.look.style(Role::Accent),
+    let muted = state.look.style(Role::Muted);
+    let sign = match (playback.playing, state.plain_letters) {
+        (true, false) => " ▶ ",
+        (false, false) => " ∎ ",
+        (true, true) => " > ",
+        (false, true) => " . ",
+    };
+    let rate = format!("{:.4} fps x{} ", Short(state.fps()), playback.speed);
+    let seconds = format!("{:.2} s ", (playback.t - 1.0) / state.fps());
+    let frame = format!("frame {:.2}/{} ", playback.t, state.frames());
+    vec![
+        (0, Span::styled(sign, state.look.style(Role::Accent))),
+        (0, Span::raw(format!("{} ", state.name))),
+        (0, Span::raw(frame)),
+        (3, Span::styled(seconds, muted)),
+        (
+            if playback.speed == 1.0 { 4 } else { 2 },
+            Span::styled(rate, muted),
         ),
-        Span::raw(format!("{} ", state.name)),
-        Span::raw(format!("frame {:.2}/{} ", playback.t, state.frames())),
-        Span::styled(format!("{:.2} s ", (playback.t - 1.0) / state.fps()), muted),
-        Span::styled(
-            format!("{:.4} fps x{} ", Short(state.fps()), playback.speed),
-            muted,
-        ),
-    ];
-    if let Some(loom) = state.loom() {
-        let (k, l) = (loom.time().controls().len(), loom.pose().sites().len());
-        let error = 100.0 * loom.report().error.total;
-        spans.push(Span::raw(format!(
-            "k={k} l={l} m={} ",
-            loom.shape().modes()
-        )));
-        spans.push(Span::styled(format!("error {error:.3} % "), muted));
-    }
-    if let Some(words) = panels::posed_words(state) {
-        spans.push(Span::raw(words));
-    }
+    ]
+}
+
+/// The sizes of the loom, and how far it is from its frames.
+fn loom_words(state: &State) -> Vec<Part> {
+    let Some(loom) = state.loom() else {
+        return Vec::new();
+    };
+    let (k, l) = (loom.time().controls().len(), loom.pose().sites().len());
+    let m = loom.shape().modes();
+    let error = 100.0 * loom.report().error.total;
+    let muted = state.look.style(Role::Muted);
+    vec![
+        (2, Span::raw(format!("k={k} l={l} m={m} "))),
+        (1, Span::styled(format!("error {error:.3} % "), muted)),
+    ]
+}
+
+/// The work in the background, what is in hand, and a word to the user.
+fn happening(state: &State) -> Vec<Span<'static>> {
+    let mut spans = Vec::new();
     if let Some((phase, done, steps)) = state.work {
         let share = if steps > 0 {
-            format!(" {done}/{steps}")
+            format!(" {} {done}/{steps}", progress_bar(state, done, steps))
         } else {
             String::new()
         };
-        spans.push(Span::styled(
-            format!("{phase}{share} "),
-            state.look.style(Role::Mark),
-        ));
+        let words = format!("{phase}{share} ");
+        spans.push(Span::styled(words, state.look.style(Role::Mark)));
     }
     if let Some(held) = &state.hands.held {
         let words = format!("{}: enter lets go, esc puts back ", held.words());
         spans.push(Span::styled(words, state.look.style(Role::Accent)));
     }
-    match &state.notice {
-        Some(notice) => {
-            let role = if notice.bad { Role::Bad } else { Role::Mark };
-            spans.push(Span::styled(notice.text.clone(), state.look.style(role)));
-        }
-        None => spans.push(Span::styled("? keys  q quit", muted)),
+    if let Some(notice) = &state.notice {
+        let role = if notice.bad { Role::Bad } else { Role::Mark };
+        let style = state.look.style(role);
+        spans.push(Span::styled(notice.text.clone(), style));
+    } else if state.hands.held.is_none() {
+        let muted = state.look.style(Role::Muted);
+        spans.push(Span::styled("? keys  q quit", muted));
     }
-    Paragraph::new(Line::from(spans))
-        .style(state.look.bar())
-        .render(area, buffer);
+    spans
+}
+
+/// Cells of a progress bar.
+const BAR: usize = 10;
+
+/// How much of the work is done, as cells.
+fn progress_bar(state: &State, done: usize, steps: usize) -> String {
+    let full = (BAR * done.min(steps)).div_euclid(steps.max(1));
+    let [one, other] = if state.plain_letters {
+        ["#", "."]
+    } else {
+        ["━", "╌"]
+    };
+    [one.repeat(full), other.repeat(BAR - full)].concat()
+}
+
+/// The parts that a line of `width` columns has room for.
+fn fitting(mut parts: Vec<Part>, width: usize) -> Vec<Span<'static>> {
+    while parts.iter().map(|(_, span)| span.width()).sum::<usize>() > width {
+        let most = (0..parts.len()).max_by_key(|&index| parts[index].0);
+        match most.filter(|&index| parts[index].0 > 0) {
+            Some(index) => drop(parts.remove(index)),
+            None => break,
+        }
+    }
+    parts.into_iter().map(|(_, span)| span).collect()
 }
 
 /// A number without digits that say nothing.
@@ -274,4 +320,25 @@ fn draw_palette(state: &State, typed: &str, chosen: usize, buffer: &mut Buffer) 
         });
     }
     Paragraph::new(lines).render(inside, buffer);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_spare_leaves_the_status_line_first() {
+        let parts = || vec![(0, "a b"), (2, "cc"), (3, "dddd"), (1, "e"), (0, "f")];
+        let shown = |width| {
+            let parts = parts()
+                .into_iter()
+                .map(|(rank, text)| (rank, Span::raw(text)));
+            let spans = fitting(parts.collect(), width);
+            spans.iter().map(|span| &*span.content).collect::<String>()
+        };
+        assert_eq!(shown(11), "a bccddddef");
+        assert_eq!(shown(10), "a bccef");
+        assert_eq!(shown(6), "a bef");
+        assert_eq!(shown(2), "a bf");
+    }
 }

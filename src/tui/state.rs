@@ -66,6 +66,8 @@ pub(super) struct State {
     pub(super) work: Option<(&'static str, usize, usize)>,
     /// Pictures of the panels.
     pub(super) slots: Vec<Slot>,
+    /// Whether pictures may be coarse, for what they show is being moved.
+    pub(super) rough: bool,
     /// What the mouse holds.
     pub(super) drag: Option<Drag>,
     /// Numbers given to questions so far.
@@ -231,9 +233,25 @@ pub(super) struct Notice {
 #[derive(Debug, Default)]
 pub(super) struct Slot {
     pub(super) shown: Option<Arc<Picture>>,
+    /// What was shown a moment ago, with its data elsewhere: who presses now may have aimed at it.
+    pub(super) before: Option<Arc<Picture>>,
     /// Number of the question that `shown` answers.
     pub(super) number: u64,
     pub(super) asked: Option<Wish>,
+}
+
+impl Slot {
+    /// Another picture takes the place of the one that is shown.
+    pub(super) fn show(&mut self, picture: Arc<Picture>) {
+        let last = self.shown.replace(picture);
+        let moved = |last: &Arc<Picture>| {
+            let of = self.shown.as_ref().map(|now| (&now.planes, &now.of));
+            of != Some((&last.planes, &last.of))
+        };
+        if let Some(last) = last.filter(moved) {
+            self.before = Some(last);
+        }
+    }
 }
 
 /// What the mouse holds, and where it was last.
@@ -277,6 +295,7 @@ impl State {
             notice: None,
             work: None,
             slots: PANELS.iter().map(|_| Slot::default()).collect(),
+            rough: false,
             drag: None,
             asked: 0,
             hands: Hands::default(),
@@ -396,6 +415,16 @@ impl State {
         PANELS[panel].canvas(self, layout::inner(area))
     }
 
+    /// Whether something is to be done once nothing happens any more.
+    pub(super) fn is_unsettled(&self) -> bool {
+        self.rough || self.slots.iter().any(|slot| slot.before.is_some())
+    }
+
+    /// Pictures are drawn with so many times fewer pixels each way.
+    pub(super) fn coarseness(&self) -> u16 {
+        if self.rough && self.cell.scales { 2 } else { 1 }
+    }
+
     /// Whether pictures have pixels enough for letters.
     pub(super) fn lettered(&self) -> bool {
         self.cell.height >= LEGIBLE
@@ -413,7 +442,8 @@ impl State {
     pub(super) fn pixels(&self, area: Rect) -> (usize, usize) {
         let across = usize::from(area.width) * usize::from(self.cell.width);
         let down = usize::from(area.height) * usize::from(self.cell.height);
-        (across, down)
+        let coarse = usize::from(self.coarseness());
+        ((across / coarse).max(1), (down / coarse).max(1))
     }
 }
 

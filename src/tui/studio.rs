@@ -14,9 +14,10 @@ use ratatui::crossterm::terminal::size;
 use ratatui::layout::Rect;
 
 use super::event::{Answer, Command, Event};
-use super::graphics::{Aside, Painter, Protocol, choose, painter};
+use super::graphics::{Answers, Aside, Choice, Painter, Protocol, choose, painter, read_answers};
 use super::hands::{Desk, Errand, Reply, Workers};
 use super::keys::LateAnswer;
+use super::panels::MESH;
 use super::screen;
 use super::stage;
 use super::state::{Content, Same, Scene, Span, State};
@@ -36,6 +37,9 @@ use crate::task::{Cancelled, Observer, Task};
 const FRAME: Duration = Duration::from_millis(33);
 /// How often a signal is looked for while no key is pressed: within the grace it gives.
 const WATCH: Duration = Duration::from_millis(25);
+/// When nothing has happened for so long, what moved has come to rest: about as long as a hand needs to
+/// answer what the eye sees.
+const STILL: Duration = Duration::from_millis(150);
 /// Answers of a slow terminal come no later.
 const LATEST: Duration = Duration::from_secs(10);
 
@@ -90,6 +94,12 @@ pub struct Options {
 }
 
 impl Options {
+    /// How pictures are shown until the terminal has answered: in characters, which show everywhere.
+    fn first_choice(&self) -> Choice {
+        let wanted = self.graphics.filter(|wanted| !wanted.has_pixels());
+        choose(wanted, &Answers::default(), self.tmux, self.colour)
+    }
+
     /// How many colours there are.
     pub(super) fn depth(&self) -> Depth {
         match (self.colour, self.true_colour) {
@@ -116,17 +126,16 @@ pub fn run(
     let cancel = Task::default();
     // Files are read while the terminal is waited for.
     start_opening(&files, desk, &send, &cancel);
-    let answers = terminal::ask(options.tmux);
-    let choice = choose(options.graphics, &answers, options.tmux, options.colour);
-    let dark = answers.background.is_none_or(is_dark);
+    let choice = options.first_choice();
     let look = Look {
-        dark,
+        dark: true,
         depth: options.depth(),
     };
     let mut state = State::new(options.name.clone(), screen, choice.cell, look);
     state.plain_letters = choice.protocol == Protocol::Ascii;
     state.work = Some(("load", 0, 0));
     let mut studio = Studio::new(state, painter(&choice, look), files, desk, send, cancel);
+    studio.listen(options.clone(), task);
     let ended = studio.run(&receive, task);
     studio.cancel.cancel();
     studio.hands.cancel();
@@ -157,7 +166,8 @@ struct Studio {
     shown: Buffer,
     /// Whether it is to be cleared first.
     stale: bool,
-    mailbox: Arc<Mailbox>,
+    /// Questions about plots, and about the mesh: neither waits for the other.
+    mailboxes: [Arc<Mailbox>; 2],
     thumbs: Arc<Newest>,
     files: Arc<dyn Files>,
     hands: Workers,
@@ -217,7 +227,7 @@ impl Studio {
             stale: true,
             state,
             painter,
-            mailbox: Arc::default(),
+            mailboxes: Default::default(),
             thumbs: Arc::default(),
             files,
             hands,
@@ -229,9 +239,10 @@ impl Studio {
     }
 
     fn run(&mut self, receive: &Receiver<Event>, task: &Task) -> Result<()> {
-        start_painter(Arc::clone(&self.mailbox), self.events.clone());
+        for mailbox in &self.mailboxes {
+            start_painter(Arc::clone(mailbox), self.events.clone());
+        }
         start_thumbs(Arc::clone(&self.thumbs), self.events.clone());
-        self.listen(task);
         self.draw()?;
         loop {
             let Some(event) = self.next(receive)? else {
@@ -255,7 +266,14 @@ impl Studio {
     fn next(&mut self, receive: &Receiver<Event>) -> Result<Option<Event>> {
         if !self.state.playback.playing {
             self.last_tick = Instant::now();
-            return Ok(receive.recv().ok());
+            if !self.state.is_unsettled() {
+                return Ok(receive.recv().ok());
+            }
+            return Ok(match receive.recv_timeout(STILL) {
+                Ok(event) => Some(event),
+                Err(RecvTimeoutError::Timeout) => Some(Event::Still),
+                Err(RecvTimeoutError::Disconnected) => None,
+            });
         }
         let wait = FRAME.saturating_sub(self.last_tick.elapsed());
         match receive.recv_timeout(wait) {
@@ -276,12 +294,13 @@ impl Studio {
                 panel,
                 number,
                 wish,
-            } => self.mailbox.ask(panel, number, wish),
+            } => self.mailboxes[usize::from(panel == MESH)].ask(panel, number, wish),
             Command::DrawThumbs(number, wish) => self.thumbs.ask(number, wish),
             Command::SavePicture(name, wish) => self.save_picture(name, wish),
             Command::Export(span) => self.export(span),
             Command::Hands(Errand::Edit) => self.edit()?,
             Command::Hands(errand) => self.hands.carry_out(errand),
+            Command::Present(choice) => self.present(&choice)?,
             Command::Redraw => self.stale = true,
             Command::Suspend => {
                 terminal::suspend().map_err(lost)?;
@@ -290,6 +309,14 @@ impl Studio {
             Command::Quit => return Ok(false),
         }
         Ok(true)
+    }
+
+    /// Shows pictures in another way.
+    fn present(&mut self, choice: &Choice) -> Result<()> {
+        self.forget();
+        self.painter = painter(choice, self.state.look);
+        self.stale = true;
+        Ok(())
     }
 
     /// Lends the terminal to the user's editor.
@@ -338,11 +365,17 @@ impl Studio {
         let _ = terminal::send(&aside.before);
     }
 
-    /// Keys, mouse, sizes and signals become events.
-    fn listen(&self, task: &Task) {
+    /// What the terminal answers, keys, mouse, sizes and signals become events.
+    fn listen(&self, options: Options, task: &Task) {
         let (events, task, ended) = (self.events.clone(), task.clone(), self.cancel.clone());
         let board = Arc::clone(&self.keyboard);
         start("keyboard", move || {
+            let mut interview = Interview::new(options);
+            let (answers, typed) = terminal::ask_while_typed_at(interview.options.tmux);
+            interview.hear(answers, &events);
+            for event in typed.into_iter().filter_map(heard) {
+                let _ = events.send(event);
+            }
             let (begin, mut late) = (Instant::now(), LateAnswer::default());
             loop {
                 if ended.cancelled() {
@@ -357,18 +390,13 @@ impl Studio {
                     && begin.elapsed() < LATEST
                     && late.takes(*key)
                 {
+                    if let Some(answer) = late.answer() {
+                        interview.hear_late(&answer, &events);
+                    }
                     continue;
                 }
-                let event = match event {
-                    Ok(keyboard::Event::Key(key)) if key.kind != KeyEventKind::Release => {
-                        Event::Key(key)
-                    }
-                    Ok(keyboard::Event::Mouse(mouse)) => Event::Mouse(mouse),
-                    Ok(keyboard::Event::Resize(columns, rows)) => Event::Resize(columns, rows),
-                    Ok(_) => continue,
-                    Err(_) => Event::Signal,
-                };
-                if events.send(event).is_err() {
+                let event = event.map_or(Some(Event::Signal), heard);
+                if event.is_some_and(|event| events.send(event).is_err()) {
                     return;
                 }
             }
@@ -401,6 +429,64 @@ impl Studio {
             let answer = saved.map_or_else(Answer::NotSaved, Answer::Saved);
             let _ = events.send(Event::Answer(answer));
         });
+    }
+}
+
+/// What the keyboard says, as far as it is listened to.
+fn heard(event: keyboard::Event) -> Option<Event> {
+    match event {
+        keyboard::Event::Key(key) if key.kind != KeyEventKind::Release => Some(Event::Key(key)),
+        keyboard::Event::Mouse(mouse) => Some(Event::Mouse(mouse)),
+        keyboard::Event::Resize(columns, rows) => Some(Event::Resize(columns, rows)),
+        _ => None,
+    }
+}
+
+/// What the terminal has answered so far, and what was made of it.
+struct Interview {
+    options: Options,
+    answers: Answers,
+    /// The choice that is in force, and whether the background is dark.
+    told: (Choice, bool),
+}
+
+impl Interview {
+    fn new(options: Options) -> Self {
+        Interview {
+            told: (options.first_choice(), true),
+            answers: Answers::default(),
+            options,
+        }
+    }
+
+    /// Tells the studio if it is to look otherwise.
+    fn hear(&mut self, answers: Answers, events: &Sender<Event>) {
+        let Options {
+            graphics,
+            tmux,
+            colour,
+            ..
+        } = self.options;
+        let choice = choose(graphics, &answers, tmux, colour);
+        let dark = answers.background.is_none_or(is_dark);
+        self.answers = answers;
+        let same = (self.told.0.protocol, self.told.0.cell, self.told.1)
+            == (choice.protocol, choice.cell, dark);
+        if !same {
+            self.told = (choice.clone(), dark);
+            let answer = Answer::Terminal(Box::new(choice), dark);
+            let _ = events.send(Event::Answer(answer));
+        }
+    }
+
+    /// An answer that came among the keys.
+    fn hear_late(&mut self, answer: &str, events: &Sender<Event>) {
+        let mut bytes = std::mem::take(&mut self.answers.bytes);
+        bytes.extend_from_slice(answer.as_bytes());
+        let cell = self.answers.cell;
+        let mut answers = read_answers(&bytes);
+        answers.cell = answers.cell.or(cell);
+        self.hear(answers, events);
     }
 }
 

@@ -9,13 +9,14 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use ratatui::crossterm::cursor::{Hide, Show};
-use ratatui::crossterm::event::{DisableMouseCapture, EnableMouseCapture};
+use ratatui::crossterm::event::{self as keyboard, DisableMouseCapture, EnableMouseCapture};
 use ratatui::crossterm::terminal::{
     EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode, enable_raw_mode,
 };
 use ratatui::crossterm::{execute, queue};
 
 use super::graphics::{Answers, read_answers};
+use super::typed::typed;
 
 /// How long a terminal may take to answer; the last read can add a tenth of a second to half of it.
 #[cfg(unix)]
@@ -87,12 +88,18 @@ pub(super) fn send(bytes: &[u8]) -> io::Result<()> {
 /// Asks the terminal what it can show, if need be through tmux. One that says nothing, or not enough, is
 /// waited for 200 ms.
 pub fn ask(tmux: bool) -> Answers {
+    ask_while_typed_at(tmux).0
+}
+
+/// The same, and what hands did meanwhile.
+pub(super) fn ask_while_typed_at(tmux: bool) -> (Answers, Vec<keyboard::Event>) {
     // A terminal that cannot be asked has said nothing.
-    let mut answers = read_answers(&exchange(tmux).unwrap_or_default());
+    let bytes = exchange(tmux).unwrap_or_default();
+    let mut answers = read_answers(&bytes);
     if !tmux {
         answers.cell = answers.cell.or_else(window_cell);
     }
-    answers
+    (answers, typed(&bytes))
 }
 
 /// Columns and rows of a cell in pixels by the size of the window, where the system knows it: a little too
@@ -108,7 +115,7 @@ fn window_cell() -> Option<(u16, u16)> {
 #[cfg(unix)]
 fn exchange(tmux: bool) -> io::Result<Vec<u8>> {
     use rustix::termios::{OptionalActions, SpecialCodeIndex, tcgetattr, tcsetattr};
-    let keyboard = io::stdin();
+    let (keyboard, held) = (io::stdin(), HELD.load(Ordering::SeqCst));
     let before = tcgetattr(&keyboard)?;
     let mut waiting = before.clone();
     waiting.make_raw();
@@ -117,7 +124,10 @@ fn exchange(tmux: bool) -> io::Result<Vec<u8>> {
     waiting.special_codes[SpecialCodeIndex::VTIME] = 1;
     tcsetattr(&keyboard, OptionalActions::Now, &waiting)?;
     let bytes = collect(tmux);
-    tcsetattr(&keyboard, OptionalActions::Now, &before)?;
+    // Given back meanwhile, it is no longer ours to set.
+    if HELD.load(Ordering::SeqCst) || !held {
+        tcsetattr(&keyboard, OptionalActions::Now, &before)?;
+    }
     bytes
 }
 
@@ -139,4 +149,55 @@ fn collect(tmux: bool) -> io::Result<Vec<u8>> {
 #[cfg(not(unix))]
 fn exchange(_: bool) -> io::Result<Vec<u8>> {
     Ok(Vec::new())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Read;
+    use std::num::NonZero;
+
+    use portable_pty::{CommandBuilder, PtySize, native_pty_system};
+
+    #[test]
+    #[ignore = "run by the test below, in a terminal of its own"]
+    fn a_program_that_panics() {
+        super::take().expect("a terminal");
+        panic!("as it was told to");
+    }
+
+    #[test]
+    fn a_panic_gives_the_terminal_back_before_it_is_told() {
+        let size = PtySize {
+            rows: 30,
+            cols: 100,
+            ..PtySize::default()
+        };
+        let pair = native_pty_system().openpty(size).expect("a terminal");
+        let itself = std::env::current_exe().expect("this program");
+        let mut command = CommandBuilder::new(itself);
+        let name = "tui::terminal::tests::a_program_that_panics";
+        command.args(["--exact", name, "--ignored", "--nocapture"]);
+        let mut child = pair.slave.spawn_command(command).expect("it starts");
+        drop(pair.slave);
+        let mut output = pair.master.try_clone_reader().expect("its output");
+        let (mut bytes, mut part) = (Vec::new(), [0; 4096]);
+        while let Ok(length @ 1..) = output.read(&mut part) {
+            bytes.extend_from_slice(&part[..length]);
+        }
+        assert!(!child.wait().expect("its end").success());
+        let cells = |count: u16| NonZero::new(count).expect("some");
+        let mut parser = vt100::Parser::new(cells(size.rows), cells(size.cols), 0);
+        let taken = bytes
+            .windows(8)
+            .position(|part| part == b"\x1b[?1049h")
+            .expect("the terminal was taken");
+        parser.process(&bytes[..taken + 8]);
+        assert!(parser.screen().alternate_screen());
+        parser.process(&bytes[taken + 8..]);
+        let screen = parser.screen();
+        assert!(!screen.alternate_screen() && !screen.hide_cursor());
+        let mouse = screen.mouse_protocol_mode();
+        assert_eq!(mouse, vt100::MouseProtocolMode::None);
+        assert!(screen.contents().contains("as it was told to"));
+    }
 }

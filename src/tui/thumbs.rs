@@ -29,7 +29,7 @@ const LONGEST: Duration = Duration::from_millis(120);
 /// What is ready is shown this often.
 const BATCH: Duration = Duration::from_millis(250);
 /// A shape so many times as large as those along the curve has burst.
-const LARGEST: f64 = 1.5;
+const LARGEST: f64 = 1.2;
 /// Places along the curve whose shapes say how large a mesh is.
 const SIZES: usize = 9;
 

@@ -6,6 +6,7 @@ use ratatui::crossterm::event::{KeyCode, KeyEvent, MouseButton, MouseEvent, Mous
 use ratatui::layout::Rect;
 
 use super::event::{Answer, Command, Event};
+use super::graphics::{Choice, Protocol};
 use super::hands;
 use super::keys::{self, Action};
 use super::layout::{tabbed, tabs};
@@ -36,8 +37,16 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Command> {
             advance(state, passed);
             Vec::new()
         }
+        Event::Still => {
+            state.rough = false;
+            for slot in &mut state.slots {
+                slot.before = None;
+            }
+            Vec::new()
+        }
         Event::Answer(answer) => match answer {
             Answer::Hands(reply) => hands::reply(state, reply),
+            Answer::Terminal(choice, dark) => present(state, choice, dark),
             answer => {
                 on_answer(state, answer);
                 Vec::new()
@@ -50,6 +59,17 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Command> {
     }
     commands.extend(questions(state));
     commands
+}
+
+/// The terminal has said what it can show.
+fn present(state: &mut State, choice: Box<Choice>, dark: bool) -> Vec<Command> {
+    state.look.dark = dark;
+    state.cell = choice.cell;
+    state.plain_letters = choice.protocol == Protocol::Ascii;
+    for slot in &mut state.slots {
+        (slot.shown, slot.asked) = (None, None);
+    }
+    vec![Command::Present(choice)]
 }
 
 /// The end; what is not saved is kept.
@@ -120,7 +140,7 @@ fn on_answer(state: &mut State, answer: Answer) {
             let slot = &mut state.slots[panel];
             if number > slot.number {
                 slot.number = number;
-                slot.shown = Some(picture);
+                slot.show(picture);
             }
         }
         Answer::Thumbs { number, thumbs } => {
@@ -129,9 +149,15 @@ fn on_answer(state: &mut State, answer: Answer) {
                 state.thumbs.shown = Some(thumbs);
             }
         }
-        Answer::Saved(path) => say(state, format!("written: {}", path.display()), false),
-        Answer::NotSaved(error) => say(state, error.to_string().replace("\n  ", "; "), true),
-        Answer::Hands(_) => {}
+        Answer::Saved(path) => {
+            state.work = None;
+            say(state, format!("written: {}", path.display()), false);
+        }
+        Answer::NotSaved(error) => {
+            state.work = None;
+            say(state, error.to_string().replace("\n  ", "; "), true);
+        }
+        Answer::Hands(_) | Answer::Terminal(..) => {}
     }
 }
 
@@ -501,7 +527,7 @@ fn point(state: &mut State, panel: usize, area: Rect, mouse: MouseEvent) {
         && let Some(plane) = picture.planes.first()
     {
         let reach = 2.0 * picture.image.width as f32 / f32::from(canvas.width.max(1));
-        match map::nearest_time(state, plane, at, reach) {
+        match map::nearest_time(&picture, plane, at, reach) {
             Some(t) => scrub(state, t),
             None => {
                 state.playback.playing = false;

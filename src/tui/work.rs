@@ -41,6 +41,8 @@ pub(super) struct Wish {
     pub(super) text: f32,
     /// Plots are drawn so many times as fine as they are shown.
     pub(super) fine: usize,
+    /// Whether it is to be there soon rather than fine.
+    pub(super) coarse: bool,
     pub(super) look: Look,
 }
 
@@ -94,8 +96,12 @@ pub(super) struct Picture {
     pub(super) image: Image,
     /// One for a map, one for each of the time signals, none for a mesh.
     pub(super) planes: Vec<Plane>,
+    /// Of a map, what it shows: what is pointed at on it is this.
+    pub(super) of: Option<Same<Signals>>,
     /// What is to be said about it.
     pub(super) note: String,
+    /// Whether a finer one is to follow.
+    pub(super) coarse: bool,
 }
 
 impl Picture {
@@ -154,7 +160,11 @@ impl Brush {
                     map.pins.clear();
                 }
                 let (scene, plane) = pose_space(&map, width, height, &theme);
-                picture(&scene, vec![plane], fine)
+                Picture {
+                    of: Some(signals.clone()),
+                    coarse: wish.coarse,
+                    ..picture(&scene, vec![plane], fine)
+                }
             }
             Subject::Times(signals) if wish.text == 0.0 && wish.size.1 < ALL_SIGNALS => {
                 let (scene, planes) = chart(&coarse(&signals.0.times), width, height, &theme);
@@ -186,7 +196,9 @@ impl Brush {
                 Picture {
                     image,
                     planes: Vec::new(),
+                    of: None,
                     note,
+                    coarse: wish.coarse,
                 }
             }
         }
@@ -220,7 +232,11 @@ impl Brush {
         theme: &Theme,
     ) -> Image {
         // Few pixels are drawn twice as fine, so that outlines are smooth.
-        let fine = if size.0 * size.1 < 60_000 { 2 } else { 1 };
+        let fine = if size.0 * size.1 < 60_000 && !wish.coarse {
+            2
+        } else {
+            1
+        };
         let mut image = Image::new(fine * size.0, fine * size.1);
         let camera = camera(&pose.bounds(), view, size);
         let wire = view.wires.then(|| Wire {
@@ -311,7 +327,9 @@ fn picture(scene: &plot::Scene, planes: Vec<Plane>, fine: usize) -> Picture {
     Picture {
         planes: planes.collect(),
         image,
+        of: None,
         note: String::new(),
+        coarse: false,
     }
 }
 

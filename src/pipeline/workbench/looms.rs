@@ -68,12 +68,14 @@ impl Workbench {
         })?;
         self.hold_loom(&fitted.loom)?;
         self.note("fit", format!("{} frames", frames.value.frames()), made);
+        let loom = Keyed::new(fitted.loom.clone(), key);
         let source = Source {
             frames: frames.clone(),
             request: request.clone(),
+            fitted: Arc::clone(&loom.value),
         };
         let output = LoomValue {
-            loom: Keyed::new(fitted.loom.clone(), key),
+            loom,
             source: Some(Arc::new(source)),
             edits: Vec::new(),
         };

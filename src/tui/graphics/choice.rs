@@ -151,12 +151,8 @@ pub fn choose(wanted: Option<Protocol>, answers: &Answers, tmux: bool, colour: b
         None if tmux => within_tmux(answers),
         None => direct(answers),
     };
-    let pixels = matches!(
-        protocol,
-        Protocol::Kitty | Protocol::Iterm2 | Protocol::Sixel
-    );
     let usual = CellSize::of(protocol);
-    let cell = match answers.cell.filter(|_| pixels) {
+    let cell = match answers.cell.filter(|_| protocol.has_pixels()) {
         Some((width, height)) => CellSize {
             width,
             height,

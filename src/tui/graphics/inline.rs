@@ -64,7 +64,8 @@ impl<E: Encoder> Inline<E> {
                 !now.covered[cell] && !last.is_some_and(same)
             })
             .collect();
-        for part in rectangles(&stale, wide) {
+        let parts = rectangles(&stale, wide);
+        for part in parts.into_iter().flat_map(|part| pieces(part, self.cell)) {
             let at = (now.area.x + part.x + 1, now.area.y + part.y + 1);
             aside
                 .before
@@ -214,6 +215,21 @@ fn rectangles(set: &[bool], wide: usize) -> Vec<Rect> {
     parts
 }
 
+/// Pictures with more pixels than this each way are sent in pieces: xterm leaves out what has more than 1000.
+const LARGEST: u16 = 960;
+
+/// A rectangle of cells, in pieces that are not too large.
+fn pieces(part: Rect, cell: CellSize) -> Vec<Rect> {
+    let most = |side: u16| (LARGEST / side.max(1)).max(1);
+    let (wide, tall) = (most(cell.width), most(cell.height));
+    let rows = (part.y..part.bottom()).step_by(usize::from(tall));
+    let starts = rows.flat_map(|y| {
+        let columns = (part.x..part.right()).step_by(usize::from(wide));
+        columns.map(move |x| Rect::new(x, y, wide, tall))
+    });
+    starts.map(|piece| piece.intersection(part)).collect()
+}
+
 fn continues(part: &Rect, row: &Rect) -> bool {
     (part.x, part.width, part.bottom()) == (row.x, row.width, row.y)
 }
@@ -243,6 +259,7 @@ mod tests {
         height: 1,
         fine: 1,
         shades: true,
+        scales: false,
     };
     const AREA: Rect = Rect::new(2, 1, 3, 2);
 
@@ -310,6 +327,25 @@ mod tests {
         frame(&mut painter, &mut last, [1; 6], &[]);
         let empty = Buffer::empty(Rect::new(0, 0, 8, 4));
         assert_eq!(last.diff(&empty).len(), 6);
+    }
+
+    #[test]
+    fn large_pictures_are_sent_in_pieces_that_cover_them() {
+        let cell = CellSize {
+            width: 10,
+            height: 20,
+            ..CELL
+        };
+        let part = Rect::new(1, 2, 200, 60);
+        let pieces = pieces(part, cell);
+        let sizes = pieces
+            .iter()
+            .map(|piece| (piece.width * 10, piece.height * 20));
+        assert!(sizes.max().unwrap() <= (LARGEST, LARGEST));
+        let cells: u32 = pieces.iter().map(|piece| piece.area()).sum();
+        assert_eq!(cells, part.area());
+        assert_eq!(pieces.iter().copied().reduce(Rect::union), Some(part));
+        assert_eq!(super::pieces(Rect::new(0, 0, 96, 48), cell).len(), 1);
     }
 
     #[test]

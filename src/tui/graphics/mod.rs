@@ -50,6 +50,11 @@ impl Protocol {
         Protocol::Ascii,
     ];
 
+    /// Whether it shows pixels, not characters.
+    pub(super) fn has_pixels(self) -> bool {
+        matches!(self, Protocol::Kitty | Protocol::Iterm2 | Protocol::Sixel)
+    }
+
     /// Its name on the command line.
     pub fn name(self) -> &'static str {
         match self {
@@ -82,6 +87,8 @@ pub(super) struct CellSize {
     pub(super) fine: u16,
     /// Whether surfaces show by their shades, not lines only.
     pub(super) shades: bool,
+    /// Whether the terminal scales a picture to its cells: a coarse one will do while things move.
+    pub(super) scales: bool,
 }
 
 impl CellSize {
@@ -98,6 +105,7 @@ impl CellSize {
             height,
             fine,
             shades: !matches!(protocol, Protocol::Braille | Protocol::Ascii),
+            scales: protocol == Protocol::Kitty,
         }
     }
 }

@@ -5,12 +5,13 @@ use ratatui::crossterm::event::KeyEvent;
 use super::held::{Held, Moment, Spot, cancel, drop, shift, take};
 use super::runner::Run;
 use super::{Errand, keys, sliders};
+use crate::loom::Loom;
 use crate::recipe::Make;
 use crate::recipe::gesture::{Gesture, write};
 use crate::tui::event::Command;
 use crate::tui::keys::{Action, named};
 use crate::tui::panels::{RECIPE, map};
-use crate::tui::state::{Notice, State};
+use crate::tui::state::{Notice, Same, State};
 
 /// Frames that one `hold` adds.
 const HOLD: usize = 5;
@@ -365,42 +366,53 @@ fn other_control(state: &mut State, by: isize) -> Vec<Command> {
     commands
 }
 
-/// Whether frames can be pinned; it is said if not.
-pub(super) fn can_pin(state: &mut State) -> bool {
-    let edited = state.loom().is_none_or(|loom| {
-        let time = loom.time();
-        time.places().len() != loom.layout().positions.len() || !time.warps().is_empty()
-    });
-    let why = match (state.hands.pinnable, edited) {
-        (true, false) => return true,
-        (false, _) => "pins need the frames: open the capture, not its loom",
-        (true, true) => "pin before the time is edited: the pin's line goes above",
-    };
-    say(state, why, true);
-    false
+/// The loom as it was fitted, whose frames can be pinned; it is said if they cannot.
+pub(super) fn pinnable(state: &mut State) -> Option<Same<Loom>> {
+    let fitted = state.hands.pinning.as_ref().map(|pins| pins.fitted.clone());
+    if fitted.is_none() {
+        say(
+            state,
+            "pins need the frames: open the capture, not its loom",
+            true,
+        );
+    }
+    fitted
+}
+
+/// The frame (from 0) of the fit at the cursor: that of the cursor's time, or once the time is edited the one
+/// whose place on the map is nearest.
+fn frame_here(state: &State, fitted: &Loom) -> Option<usize> {
+    let places = &fitted.layout().positions;
+    if state.signals()?.0.map.frames == *places {
+        let frame = (state.playback.t.round() as usize).saturating_sub(1);
+        return Some(frame.min(places.len().checked_sub(1)?));
+    }
+    let at = state.cursor()?;
+    let distance = |place: &[f64; 2]| (place[0] - at[0]).hypot(place[1] - at[1]);
+    (0..places.len()).min_by(|&a, &b| distance(&places[a]).total_cmp(&distance(&places[b])))
 }
 
 fn take_pin(state: &mut State) -> Vec<Command> {
-    if can_pin(state)
-        && let Some(loom) = state.loom()
+    if let Some(fitted) = pinnable(state)
+        && let Some(frame) = frame_here(state, &fitted.0)
+        && let Some(&place) = fitted.0.layout().positions.get(frame)
     {
-        let frame = (state.playback.t.round() as usize).clamp(1, loom.frames()) - 1;
-        let spot = Spot::still(loom.layout().positions[frame]);
-        take(state, Held::Pin(frame, spot));
+        take(state, Held::Pin(frame, Spot::still(place)));
     }
     Vec::new()
 }
 
 fn unpin(state: &mut State) -> Vec<Command> {
-    let frame = state.playback.t.round() as usize;
-    let pinned = state.loom().is_some_and(|loom| {
-        let pins = &loom.layout().pins;
-        pins.iter().any(|(pinned, _)| pinned + 1 == frame)
-    });
-    if pinned {
-        return gesture(state, &Gesture::Unpin { frame });
+    let fitted = pinnable(state);
+    let here = fitted.and_then(|fitted| Some((frame_here(state, &fitted.0)?, fitted)));
+    let Some((frame, fitted)) = here else {
+        return Vec::new();
+    };
+    let pins = &fitted.0.layout().pins;
+    if pins.iter().any(|(pinned, _)| *pinned == frame) {
+        return gesture(state, &Gesture::Unpin { frame: frame + 1 });
     }
-    say(state, format!("frame {frame} is not pinned"), true);
+    say(state, format!("frame {} is not pinned", frame + 1), true);
     Vec::new()
 }
 

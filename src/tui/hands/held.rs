@@ -1,6 +1,6 @@
 //! What is in hand between taking it and letting it go.
 
-use crate::edit::Edit;
+use crate::edit::{Edit, Sketch};
 use crate::loom::Loom;
 use crate::recipe::gesture::{Gesture, retime_keys};
 use crate::recipe::{Param, Setting};
@@ -8,7 +8,7 @@ use crate::signal::warp::{Keys, Warp};
 use crate::tui::state::{Content, State};
 
 use super::keys::KeyHeld;
-use super::trial::{Base, Try, What};
+use super::trial::{Base, Pinning, Try, What};
 use super::{Errand, sliders};
 use crate::tui::event::Command;
 use crate::tui::panels::map;
@@ -120,15 +120,6 @@ impl Spot {
 }
 
 impl Held {
-    /// Where on the map it is.
-    pub(in crate::tui) fn place(&self) -> Option<[f64; 2]> {
-        match self {
-            Held::Control(_, spot) | Held::Pin(_, spot) => Some(spot.at),
-            Held::Sketch(points, _) => points.last().copied(),
-            _ => None,
-        }
-    }
-
     /// Whether letting it go changes anything.
     pub(super) fn moved(&self) -> bool {
         match self {
@@ -168,19 +159,24 @@ impl Held {
     }
 
     /// How it is shown meanwhile.
-    fn what(&self) -> Option<What> {
+    fn what(&self, pinning: Option<&Pinning>) -> Option<What> {
         Some(match self {
             Held::Control(control, spot) => What::Edit(Edit::MoveControl {
                 control: control + 1,
                 to: spot.at,
             }),
-            Held::Pin(frame, spot) => What::Pin(*frame, spot.at),
+            Held::Pin(frame, spot) => What::Pin(*frame, spot.at, pinning?.clone()),
             Held::Moment(moment) if moment.again => What::RetimeAgain(moment.keys.clone()),
             Held::Moment(moment) => What::Edit(Edit::Retime {
                 keys: moment.keys.clone(),
             }),
             Held::Key(held) => held.what(),
-            Held::Sketch(..) | Held::Slider(..) | Held::Marks(_) => return None,
+            Held::Sketch(points, _) => What::Edit(Edit::Path {
+                points: points.clone(),
+                sketch: Sketch::Through,
+                frames: None,
+            }),
+            Held::Slider(..) | Held::Marks(_) => return None,
         })
     }
 
@@ -207,7 +203,10 @@ impl Held {
 /// Takes something in hand: the map's view stays where it is meanwhile.
 pub(super) fn take(state: &mut State, held: Held) {
     state.playback.playing = false;
-    let on_map = held.place().is_some() || matches!(held, Held::Key(_));
+    let on_map = matches!(
+        held,
+        Held::Control(..) | Held::Pin(..) | Held::Sketch(..) | Held::Key(_)
+    );
     if state.window.is_none() && state.signals().is_some() && on_map {
         state.window = Some(map::window(state));
         state.hands.frozen = true;
@@ -236,15 +235,18 @@ pub(super) fn shift(state: &mut State, place: [f64; 2], time: f64) -> Vec<Comman
 /// Asks for what is in hand to be shown.
 fn show(state: &mut State) -> Vec<Command> {
     let held = state.hands.held.as_ref();
-    let Some(what) = held.filter(|held| held.moved()).and_then(Held::what) else {
-        return Vec::new();
-    };
-    try_out(state, what)
+    if held.is_some_and(Held::moved) {
+        preview(state)
+    } else {
+        Vec::new()
+    }
 }
 
 /// The same where it may be back at where it was.
 pub(super) fn preview(state: &mut State) -> Vec<Command> {
-    match state.hands.held.as_ref().and_then(Held::what) {
+    let hands = &state.hands;
+    let held = hands.held.as_ref();
+    match held.and_then(|held| held.what(hands.pinning.as_ref())) {
         Some(what) => try_out(state, what),
         None => Vec::new(),
     }
@@ -256,6 +258,7 @@ fn try_out(state: &mut State, what: What) -> Vec<Command> {
         Some(Content::Keys(keys)) => Base::Keys(keys.clone()),
         _ => return Vec::new(),
     };
+    state.rough = true;
     state.hands.tries += 1;
     vec![Command::Hands(Errand::Try(Try {
         number: state.hands.tries,
@@ -296,6 +299,7 @@ fn shown_again(state: &mut State) {
 
 fn release(state: &mut State) -> Option<Held> {
     let held = state.hands.held.take()?;
+    state.rough = false;
     if std::mem::take(&mut state.hands.frozen) {
         state.window = None;
     }

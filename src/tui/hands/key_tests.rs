@@ -18,7 +18,7 @@ fn ran(state: &mut State, commands: &[Command], content: Content) {
     let number = run_of(commands).expect("a run").number;
     let ran = Ran {
         content: Some(content),
-        pinnable: false,
+        pinning: None,
         params: Vec::new(),
         told: Vec::new(),
     };

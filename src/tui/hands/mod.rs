@@ -37,6 +37,7 @@ use super::state::Content;
 use crate::diag::Diagnostic;
 use crate::recipe::{Param, Recipe};
 use history::History;
+use trial::Pinning;
 
 /// What the hands ask for.
 #[derive(Debug, Clone, PartialEq)]
@@ -87,8 +88,8 @@ pub(super) struct Hands {
     history: History,
     /// What the last run that succeeded gave.
     pub(super) good: Option<Content>,
-    /// Whether frames can be pinned: the loom's frames are known.
-    pinnable: bool,
+    /// What pins change; none where the loom's frames are not known.
+    pub(super) pinning: Option<Pinning>,
     /// Parameters set without being written.
     settings: Vec<(String, String)>,
     /// Numbers of the last run and of the last preview.

@@ -3,10 +3,9 @@
 use ratatui::crossterm::event::{KeyModifiers, MouseButton, MouseEvent, MouseEventKind};
 use ratatui::layout::Rect;
 
-use super::act::{can_pin, scroll, take_moment};
+use super::act::{pinnable, scroll, take_moment};
 use super::held::{Held, Spot, cancel, drop, shift, take};
 use super::{keys, sliders};
-use crate::loom::Loom;
 use crate::tui::event::Command;
 use crate::tui::panels::{MAP, RECIPE, TIME};
 use crate::tui::state::State;
@@ -69,7 +68,9 @@ fn press(state: &mut State, mouse: MouseEvent, button: MouseButton) -> Option<Ve
             state.roaming = Some(spot.place);
         }
         (MAP, _) if aside => take_frame(state, &spot),
-        (MAP, MouseButton::Left) => return take_handle(state, &spot).then(|| taken(state, panel)),
+        (MAP, MouseButton::Left) => {
+            return take_handle(state, &spot, area, mouse).then(|| taken(state, panel));
+        }
         (TIME, MouseButton::Right) => take_moment(state, spot.place[0]),
         (TIME, _) if aside => take(state, Held::Marks(spot.place[0])),
         _ => return None,
@@ -154,70 +155,73 @@ fn release(state: &mut State, mouse: MouseEvent) -> Option<Vec<Command>> {
 fn click(state: &mut State, mouse: MouseEvent) {
     let spot = || {
         let (panel, area) = under(state, mouse).filter(|(panel, _)| *panel == MAP)?;
-        Pointed::at(
-            state.slots[panel].shown.as_ref()?,
-            state.canvas(panel, area),
-            mouse,
-        )
+        let picture = state.slots[panel].shown.as_ref()?;
+        let spot = Pointed::at(picture, state.canvas(panel, area), mouse)?;
+        nearest_on_curve(&spot)
     };
-    if let Some((t, _)) = spot().and_then(|spot| nearest_on_curve(state, &spot)) {
+    if let Some((t, _)) = spot() {
         scrub(state, t);
     }
 }
 
-/// A control point or a pin under the mouse comes into the hand.
-fn take_handle(state: &mut State, spot: &Pointed) -> bool {
-    let Some(loom) = state.loom() else {
-        return false;
-    };
-    let pins = loom.layout().pins.clone();
-    let pin = nearest(pins.iter().map(|(_, at)| *at), spot);
-    let control = nearest(loom.time().controls().iter().copied(), spot);
-    let to_curve = nearest_on_curve(state, spot).map_or(f64::INFINITY, |(_, distance)| distance);
+/// A pin or a control point under the mouse, as the picture shows them.
+fn handle(state: &State, spot: &Pointed) -> Option<Held> {
+    let pins = state
+        .hands
+        .pinning
+        .as_ref()
+        .map(|pins| &pins.fitted.0.layout().pins);
+    let places = pins.into_iter().flatten().map(|(_, at)| *at);
+    if let Some((index, _)) = nearest(places, spot).filter(|(_, distance)| *distance <= REACH) {
+        let &(frame, at) = pins?.get(index)?;
+        return Some(Held::Pin(frame, Spot::still(at)));
+    }
+    let seen = &spot.picture.of.as_ref()?.0.map.controls;
+    let to_curve = nearest_on_curve(spot).map_or(f64::INFINITY, |(_, distance)| distance);
     let near =
         |(_, distance): &(usize, f64)| *distance <= REACH && *distance <= to_curve + HEAD_START;
-    if let Some((index, _)) = pin.filter(|(_, distance)| *distance <= REACH)
-        && pins_shown(state)
-        && state.hands.pinnable
-    {
-        let (frame, at) = pins[index];
-        take(state, Held::Pin(frame, Spot::still(at)));
-        return true;
-    }
-    let Some((index, _)) = control.filter(near) else {
-        return false;
+    let (index, _) = nearest(seen.iter().copied(), spot).filter(near)?;
+    let now = state.loom()?.time().controls();
+    // The loom may have become another since the picture was drawn.
+    let index = if now.len() == seen.len() {
+        index
+    } else {
+        let away = |at: &[f64; 2]| (at[0] - spot.place[0]).hypot(at[1] - spot.place[1]);
+        (0..now.len()).min_by(|&a, &b| away(&now[a]).total_cmp(&away(&now[b])))?
     };
-    let Some(at) = state.loom().map(|loom| loom.time().controls()[index]) else {
-        return false;
-    };
-    take(state, Held::Control(index, Spot::still(at)));
-    true
+    Some(Held::Control(index, Spot::still(*now.get(index)?)))
 }
 
-/// Whether the map shows where frames and pins lie: not once the time is edited.
-fn pins_shown(state: &State) -> bool {
-    let signals = state.signals();
-    signals.is_some_and(|signals| !signals.0.map.pins.is_empty())
+/// What is under the mouse comes into the hand: of the map that is shown, or of the one that was there when
+/// the hand set out.
+fn take_handle(state: &mut State, spot: &Pointed, area: Rect, mouse: MouseEvent) -> bool {
+    let before = state.slots[MAP].before.clone();
+    let earlier = || {
+        let spot = Pointed::at(before.as_deref()?, area, mouse)?;
+        handle(state, &spot)
+    };
+    let Some(held) = handle(state, spot).or_else(earlier) else {
+        return false;
+    };
+    take(state, held);
+    true
 }
 
 /// The frame under the mouse comes into the hand as a pin.
 fn take_frame(state: &mut State, spot: &Pointed) {
-    if !can_pin(state) {
+    let Some(fitted) = pinnable(state) else {
         return;
-    }
-    let frames = |loom: &Loom| nearest(loom.layout().positions.iter().copied(), spot);
-    let found = state.loom().and_then(|loom| frames(loom));
-    if let Some((frame, _)) = found.filter(|(_, distance)| *distance <= PIN_REACH)
-        && let Some(loom) = state.loom()
-    {
-        let at = Spot::still(loom.layout().positions[frame]);
-        take(state, Held::Pin(frame, at));
+    };
+    let places = &fitted.0.layout().positions;
+    let found = nearest(places.iter().copied(), spot);
+    if let Some((frame, _)) = found.filter(|(_, distance)| *distance <= PIN_REACH) {
+        take(state, Held::Pin(frame, Spot::still(places[frame])));
     }
 }
 
 /// The time at which the curve comes closest, and its distance in cells.
-fn nearest_on_curve(state: &State, spot: &Pointed) -> Option<(f64, f64)> {
-    let map = &state.signals()?.0.map;
+fn nearest_on_curve(spot: &Pointed) -> Option<(f64, f64)> {
+    let map = &spot.picture.of.as_ref()?.0.map;
     let (index, distance) = nearest(map.curve.iter().copied(), spot)?;
     Some((*map.times.get(index)?, distance))
 }

@@ -91,7 +91,7 @@ fn done(state: &mut State, ran: Result<Box<Ran>, Box<Diagnostic>>) {
             page.told = ran.told;
             page.params = ran.params;
             page.chosen = page.chosen.min(page.params.len().saturating_sub(1));
-            state.hands.pinnable = ran.pinnable;
+            state.hands.pinning = ran.pinning;
             if let Some(content) = ran.content {
                 let content = known(&state.content, content);
                 state.hands.good = Some(content.clone());

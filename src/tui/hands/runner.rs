@@ -7,7 +7,7 @@ use std::sync::mpsc::Sender;
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 
 use super::desk::{Desk, Kept};
-use super::trial::{Trials, Try};
+use super::trial::{Pinning, Trials, Try};
 use super::{Errand, Reply};
 use crate::diag::{Diagnostic, Result};
 use crate::pipeline::{KeyMotion, LoomValue, Value};
@@ -16,7 +16,7 @@ use crate::task::{Cancelled, Task};
 use crate::tui::event::{Answer, Event};
 use crate::tui::posed;
 use crate::tui::stage;
-use crate::tui::state::Content;
+use crate::tui::state::{Content, Same};
 use crate::tui::work::start;
 
 /// A run that is wanted.
@@ -35,8 +35,8 @@ pub(in crate::tui) struct Run {
 pub(in crate::tui) struct Ran {
     /// What can be shown of it.
     pub(super) content: Option<Content>,
-    /// Whether frames can be pinned.
-    pub(super) pinnable: bool,
+    /// What pins change; none where the loom's frames are not known.
+    pub(super) pinning: Option<Pinning>,
     pub(super) params: Vec<Param>,
     /// The result, prints and warnings in words.
     pub(super) told: Vec<String>,
@@ -235,7 +235,11 @@ fn ran(
     };
     Ok(Box::new(Ran {
         content,
-        pinnable: loom.is_some_and(|loom| loom.source.is_some()),
+        pinning: loom.and_then(|loom| {
+            let fitted = Same(Arc::clone(&loom.source?.fitted));
+            let edits = loom.edits;
+            Some(Pinning { fitted, edits })
+        }),
         told: told(&outcome),
         params: outcome.params,
     }))

@@ -5,7 +5,8 @@ use ratatui::crossterm::event::{
     KeyCode, KeyEvent, KeyModifiers, MouseButton, MouseEvent, MouseEventKind,
 };
 
-use super::{Errand, Ran, Reply, Run};
+use super::trial::{Pinning, Trials};
+use super::{Errand, Held, Ran, Reply, Run};
 use crate::diag::Diagnostic;
 use crate::loom::test_looms::ring;
 use crate::recipe::{Param, Recipe, Setting};
@@ -13,7 +14,7 @@ use crate::tui::event::{Answer, Command, Event};
 use crate::tui::graphics::CellSize;
 use crate::tui::panels::{MAP, PANELS, RECIPE, TIME};
 use crate::tui::stage;
-use crate::tui::state::{Content, State};
+use crate::tui::state::{Content, Same, State};
 use crate::tui::theme::{Depth, Look};
 use crate::tui::update::update;
 use crate::tui::work::Brush;
@@ -21,10 +22,14 @@ use crate::tui::work::Brush;
 const START: &str = "fit(input())\n";
 
 fn result(frames: usize) -> Result<Box<Ran>, Box<Diagnostic>> {
-    let content = stage::loom(Arc::new(ring(20, frames, false))).unwrap();
+    let loom = Arc::new(ring(20, frames, false));
+    let pinning = Pinning {
+        fitted: Same(Arc::clone(&loom)),
+        edits: Vec::new(),
+    };
     Ok(Box::new(Ran {
-        content: Some(content),
-        pinnable: true,
+        content: Some(stage::loom(loom).unwrap()),
+        pinning: Some(pinning),
         params: Vec::new(),
         told: vec!["a loom".into()],
     }))
@@ -37,6 +42,7 @@ pub(super) fn open_recipe(text: &str) -> (State, Vec<Command>) {
         height: 4,
         fine: 2,
         shades: false,
+        scales: false,
     };
     let look = Look {
         dark: true,
@@ -242,6 +248,115 @@ fn a_sketch_is_drawn_by_keys() {
     let text = written(&press(&mut state, KeyCode::Enter));
     assert!(text.contains(".path([["), "{text}");
     assert_eq!(text.matches('[').count(), 4);
+}
+
+#[test]
+fn the_curve_of_a_sketch_is_shown_while_it_is_drawn() {
+    let mut state = studio();
+    letter(&mut state, 's');
+    let window = crate::tui::panels::map::window(&state);
+    // The view stays, for the curve that comes may lie elsewhere.
+    assert_eq!(state.window, Some(window));
+    let before = state.loom().unwrap().time().clone();
+    let mut asked = Vec::new();
+    for _ in 0..3 {
+        press(&mut state, KeyCode::Right);
+        asked = letter(&mut state, ' ');
+    }
+    let [Command::Hands(Errand::Try(question))] = &asked[..] else {
+        panic!("{asked:?}");
+    };
+    let number = question.number;
+    let curve = Trials::default().show(question.clone()).unwrap();
+    let Content::Loom(expected, _) = curve.clone() else {
+        panic!("no loom");
+    };
+    tell(&mut state, Reply::Tried(number, Ok(curve)));
+    assert_eq!(state.loom().unwrap().time(), expected.of.0.time());
+    assert_ne!(*state.loom().unwrap().time(), before);
+    press(&mut state, KeyCode::Esc);
+    assert_eq!(*state.loom().unwrap().time(), before);
+}
+
+#[test]
+fn frames_are_pinned_though_time_is_edited() {
+    let mut state = studio();
+    let number = run_of(&letter(&mut state, 'R')).unwrap().number;
+    // The recipe gives a longer motion than what was fitted.
+    let (longer, fitted) = (result(30).unwrap(), result(15).unwrap());
+    let ran = Ran {
+        pinning: fitted.pinning,
+        ..*longer
+    };
+    tell(&mut state, Reply::Ran(number, Ok(Box::new(ran))));
+    assert_eq!(state.frames(), 30);
+    let places = ring(20, 15, false).layout().positions.clone();
+    let from = cell(&state, MAP, places[9]);
+    let middle = MouseEventKind::Down(MouseButton::Middle);
+    mouse(&mut state, middle, from);
+    assert!(
+        matches!(state.hands.held, Some(Held::Pin(..))),
+        "{:?}",
+        state.hands.held
+    );
+    let drag = MouseEventKind::Drag(MouseButton::Middle);
+    let asked = mouse(&mut state, drag, (from.0 + 2, from.1));
+    assert!(matches!(&asked[..], [Command::Hands(Errand::Try(_))]));
+    let up = MouseEventKind::Up(MouseButton::Middle);
+    let text = written(&mouse(&mut state, up, (from.0 + 2, from.1)));
+    assert!(text.contains(".reverse()\n    .pin("), "{text}");
+    // By key, the frame whose place is nearest to the cursor.
+    let there = state.cursor().unwrap();
+    letter(&mut state, 'i');
+    let Some(Held::Pin(frame, _)) = state.hands.held else {
+        panic!("{:?}", state.hands.held);
+    };
+    let away = |at: [f64; 2]| (at[0] - there[0]).hypot(at[1] - there[1]);
+    assert!(places.iter().all(|&at| away(places[frame]) <= away(at)));
+}
+
+#[test]
+fn pictures_are_coarse_while_the_hand_moves_and_fine_when_it_rests() {
+    let mut state = studio();
+    state.cell.scales = true;
+    let sizes = |commands: Vec<Command>| -> Vec<(usize, usize)> {
+        let drawn = commands.into_iter().filter_map(|command| match command {
+            Command::Draw {
+                panel: MAP, wish, ..
+            } => Some(wish.size),
+            _ => None,
+        });
+        drawn.collect()
+    };
+    let whole = state.slots[MAP].asked.as_ref().unwrap().size;
+    letter(&mut state, 'd');
+    let right = KeyEvent::new(KeyCode::Right, KeyModifiers::NONE);
+    let moved = sizes(update(&mut state, Event::Key(right)));
+    assert_eq!(moved, [(whole.0 / 2, whole.1 / 2)]);
+    assert!(state.is_unsettled());
+    assert_eq!(sizes(update(&mut state, Event::Still)), [whole]);
+    assert!(!state.is_unsettled());
+}
+
+#[test]
+fn a_press_aimed_at_the_map_of_a_moment_ago_takes_what_was_there() {
+    let mut state = studio();
+    state.thumbs.off = true;
+    let at = state.loom().unwrap().time().controls()[7];
+    let place = cell(&state, MAP, at);
+    // The same motion in another view: the point is somewhere else now.
+    let [x, y] = crate::tui::panels::map::window(&state);
+    let aside = |range: [f64; 2]| range.map(|end| end + 0.4 * (range[1] - range[0]));
+    state.window = Some([aside(x), y]);
+    send(&mut state, Event::Tick(std::time::Duration::ZERO));
+    assert_ne!(cell(&state, MAP, at), place);
+    let down = MouseEventKind::Down(MouseButton::Left);
+    mouse(&mut state, down, place);
+    assert!(matches!(state.hands.held, Some(Held::Control(7, _))));
+    press(&mut state, KeyCode::Esc);
+    send(&mut state, Event::Still);
+    mouse(&mut state, down, place);
+    assert_eq!(state.hands.held, None);
 }
 
 #[test]

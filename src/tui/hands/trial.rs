@@ -39,10 +39,17 @@ pub(in crate::tui) enum What {
     Edit(Edit),
     /// A retime in place of the one that the loom ends in.
     RetimeAgain(Vec<[f64; 2]>),
-    /// A frame (from 0) held at a place of the map.
-    Pin(usize, [f64; 2]),
+    /// A frame (from 0) held at a place of the map that was laid out before the edits.
+    Pin(usize, [f64; 2], Pinning),
     /// Other times and handles of key poses.
     Keys(KeyControls),
+}
+
+/// What a pin changes: the loom as it was fitted, and what was done to it since.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::tui) struct Pinning {
+    pub(in crate::tui) fitted: Same<Loom>,
+    pub(in crate::tui) edits: Vec<Edit>,
 }
 
 /// Previews, and the session of the pin that is being dragged.
@@ -73,21 +80,25 @@ impl Trials {
                     .apply(&without_last_warp(loom)?)?
                     .output
             }
-            What::Pin(frame, to) => self.pinned(&base.of, *frame, *to)?,
+            What::Pin(frame, to, of) => self.pinned(of, *frame, *to)?,
             What::Keys(_) => loom.clone(),
         };
         Ok(stage::loom_within(Arc::new(shown), base.bounds))
     }
 
-    fn pinned(&mut self, base: &Same<Loom>, frame: usize, to: [f64; 2]) -> Result<Loom> {
+    /// The layout with the pin moved, and the edits done again.
+    fn pinned(&mut self, of: &Pinning, frame: usize, to: [f64; 2]) -> Result<Loom> {
+        let fitted = &of.fitted;
         let mut session = match self.session.take() {
-            Some((of, session)) if of == *base => session,
-            _ => Session::of(&base.0)?,
+            Some((known, session)) if known == *fitted => session,
+            _ => Session::of(&fitted.0)?,
         };
         let signals = session.drag(frame, to, &Task::default())?;
-        let loom = session.loom(&base.0, signals);
-        self.session = Some((base.clone(), session));
-        loom
+        let loom = session.loom(&fitted.0, signals);
+        self.session = Some((fitted.clone(), session));
+        of.edits
+            .iter()
+            .try_fold(loom?, |loom, edit| Ok(edit.apply(&loom)?.output))
     }
 }
 
@@ -108,8 +119,9 @@ fn without_last_warp(loom: &Loom) -> Result<Loom> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::loom::fit::{FitOptions, fit};
     use crate::loom::test_looms::ring;
-    use crate::mesh::Bounds;
+    use crate::mesh::{Bounds, Sequence, Topology};
 
     fn tried(loom: &Loom, what: What) -> Arc<Loom> {
         let base = Scene {
@@ -139,6 +151,52 @@ mod tests {
         };
         let shown = tried(&loom, What::Edit(edit.clone()));
         assert_eq!(shown.time(), edit.apply(&loom).unwrap().output.time());
+    }
+
+    /// A strip that bends and comes back, fitted by the method whose layout is the plain one.
+    fn fitted() -> Loom {
+        let vertices = 8_u32;
+        let faces: Vec<[u32; 3]> = (2..vertices).map(|i| [i - 2, i - 1, i]).collect();
+        let topology = Topology::from_triangles(vertices as usize, &faces).unwrap();
+        let bend = |frame: usize| 0.4 * (frame as f32 * 0.6).sin();
+        let lift = |frame: usize| 0.3 * (frame as f32 * 0.6).cos();
+        let place = |frame: usize, i: u32| {
+            let x = i as f32;
+            [x, bend(frame) * x * x, lift(frame) * x]
+        };
+        let frames = (0..14).flat_map(|frame| (0..vertices).flat_map(move |i| place(frame, i)));
+        let sequence = Sequence::new(Arc::new(topology), frames.collect(), None);
+        let options = FitOptions {
+            left_out: false,
+            ..FitOptions::default()
+        };
+        let fitted = fit(&sequence, &options, &Task::default());
+        fitted.unwrap().output
+    }
+
+    #[test]
+    fn a_pin_is_shown_below_the_edits_of_the_recipe() {
+        let fitted = fitted();
+        let edit = Edit::Hold {
+            time: 5.0,
+            frames: 3,
+        };
+        let edited = edit.apply(&fitted).unwrap().output;
+        let at = fitted.layout().positions[6];
+        let to = [1.1 * at[0] + 0.01, 1.1 * at[1]];
+        let pinning = |edits: &[Edit]| Pinning {
+            fitted: Same::new(fitted.clone()),
+            edits: edits.to_vec(),
+        };
+        let bare = tried(&fitted, What::Pin(6, to, pinning(&[])));
+        assert_eq!(bare.layout().pins, [(6, to)]);
+        let shown = tried(
+            &edited,
+            What::Pin(6, to, pinning(std::slice::from_ref(&edit))),
+        );
+        assert_eq!(shown.frames(), fitted.frames() + 3);
+        assert_eq!(shown.layout().pins, [(6, to)]);
+        assert_eq!(shown.time(), edit.apply(&bare).unwrap().output.time());
     }
 
     #[test]

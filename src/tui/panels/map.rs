@@ -8,7 +8,7 @@ use crate::plot::Plane;
 use crate::tui::state::{Content, State};
 use crate::tui::theme::Role;
 use crate::tui::thumbs::ThumbWish;
-use crate::tui::work::Subject;
+use crate::tui::work::{Picture, Subject};
 
 /// The map.
 pub(in crate::tui) struct Map;
@@ -87,23 +87,37 @@ impl Panel for Map {
     }
 }
 
-/// Sites, control points and pins as letters, where there are few pixels.
+/// Sites and control points of what the picture shows as letters, where there are few pixels; and pins, also
+/// where the picture leaves them out: once the time is edited.
 fn draw_marks(state: &State, canvas: Rect, buffer: &mut Buffer) {
-    let (Some(picture), Some(signals)) = (&state.slots[MAP].shown, state.signals()) else {
+    let Some(picture) = &state.slots[MAP].shown else {
         return;
     };
-    let Some(plane) = picture.planes.first().filter(|_| !state.lettered()) else {
+    let (Some(plane), Some(signals)) = (picture.planes.first(), &picture.of) else {
         return;
     };
     let theme = state.look.plot(0.0);
     let map = &signals.0.map;
-    let pins: Vec<[f64; 2]> = map.pins.iter().map(|pin| pin.1).collect();
+    let pinning = state.hands.pinning.as_ref();
+    let pins = pinning
+        .into_iter()
+        .flat_map(|of| &of.fitted.0.layout().pins);
+    let pins: Vec<[f64; 2]> = match map.pins.as_slice() {
+        [] => pins.map(|pin| pin.1).collect(),
+        shown => shown.iter().map(|pin| pin.1).collect(),
+    };
     let marks = [
-        ("∘", theme.series[0], &map.sites),
-        ("+", theme.series[1], &map.controls),
-        ("◆", theme.series[3], &pins),
+        ("∘", theme.series[0], &map.sites, !state.lettered()),
+        ("+", theme.series[1], &map.controls, !state.lettered()),
+        (
+            "◆",
+            theme.series[3],
+            &pins,
+            !state.lettered() || map.pins.is_empty(),
+        ),
     ];
-    for (symbol, colour, points) in marks {
+    let marks = marks.into_iter().filter(|mark| mark.3);
+    for (symbol, colour, points, _) in marks {
         let [red, green, blue, _] = colour.0;
         for &point in points {
             let at = cell_of(picture, plane, point, canvas);
@@ -140,6 +154,9 @@ pub(in crate::tui) fn thumbs(state: &State) -> Option<ThumbWish> {
     };
     let picture = state.slots[MAP].shown.as_ref()?;
     let plane = picture.planes.first()?;
+    if picture.coarse || state.rough {
+        return None;
+    }
     if state.thumbs.off || !state.cell.shades || !state.places().iter().any(|place| place.0 == MAP)
     {
         return None;
@@ -172,7 +189,7 @@ fn hovered_frame(state: &State, canvas: Rect) -> Option<(usize, (u16, u16))> {
     let plane = picture.planes.first()?;
     let pixel = picture.pixel(canvas, at);
     let column = picture.image.width as f32 / f32::from(canvas.width.max(1));
-    let frames = state.signals()?.0.map.frames.iter().enumerate();
+    let frames = picture.of.as_ref()?.0.map.frames.iter().enumerate();
     let distances = frames.map(|(index, &place)| {
         let [x, y] = plane.pixel(place);
         (index + 1, (x - pixel[0]).hypot(y - pixel[1]))
@@ -193,12 +210,12 @@ pub(in crate::tui) fn window(state: &State) -> [[f64; 2]; 2] {
 /// The time at which the curve comes closest to a pixel, if it comes within `reach` pixels; without a
 /// curve, the nearest of the frames.
 pub(in crate::tui) fn nearest_time(
-    state: &State,
+    picture: &Picture,
     plane: &Plane,
     at: [f32; 2],
     reach: f32,
 ) -> Option<f64> {
-    let map = &state.signals()?.0.map;
+    let map = &picture.of.as_ref()?.0.map;
     let distance = |point: &[f64; 2]| {
         let [x, y] = plane.pixel(*point);
         (x - at[0]).hypot(y - at[1])

@@ -3,6 +3,7 @@
 mod details;
 mod gutter;
 mod hand;
+mod hints;
 pub(super) mod map;
 pub(super) mod mesh;
 mod posed;
@@ -68,7 +69,7 @@ impl dyn Panel + '_ {
             return None;
         }
         let text = if state.lettered() {
-            0.72 * f32::from(state.cell.height)
+            0.72 * f32::from(state.cell.height) / f32::from(state.coarseness())
         } else {
             0.0
         };
@@ -77,6 +78,7 @@ impl dyn Panel + '_ {
             size: state.pixels(area),
             text,
             fine: usize::from(state.cell.fine),
+            coarse: state.coarseness() > 1,
             look: state.look,
         })
     }
@@ -94,6 +96,7 @@ impl dyn Panel + '_ {
             size,
             text: 15.0,
             fine: 1,
+            coarse: false,
             look: state.look,
         })
     }

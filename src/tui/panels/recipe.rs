@@ -6,7 +6,7 @@ use ratatui::style::{Modifier, Style};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Widget};
 
-use super::{Panel, RECIPE};
+use super::{Panel, RECIPE, hints};
 use crate::diag::Diagnostic;
 use crate::recipe::{Param, Setting};
 use crate::tui::hands::{Held, Page, VALUE, share, slider};
@@ -57,7 +57,17 @@ fn draw_page(state: &State, area: Rect, buffer: &mut Buffer) {
     let more = rows.saturating_sub(first + room);
     let head = head(state, page, name, more);
     let lines: Vec<Line> = std::iter::once(head).chain(shown).chain(told).collect();
+    let used = lines.len() as u16;
     Paragraph::new(lines).render(area, buffer);
+    if page.error.is_none() && state.hands.pinning.is_some() {
+        hints::draw(state, below(area, used), buffer);
+    }
+}
+
+/// What is left of `area` below so many rows.
+fn below(area: Rect, rows: u16) -> Rect {
+    let rows = rows.min(area.height);
+    Rect::new(area.x, area.y + rows, area.width, area.height - rows)
 }
 
 /// The file's name, whether it holds what is shown, and how much is below.

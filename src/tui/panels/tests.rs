@@ -30,6 +30,7 @@ const CELL: CellSize = CellSize {
     height: 4,
     fine: 2,
     shades: false,
+    scales: false,
 };
 
 /// A studio with nothing open yet.
@@ -287,6 +288,12 @@ fn writing_asks_for_what_is_shown() {
     state.playback.marks = [Some(9.0), Some(4.0)];
     let exported = press(&mut state, KeyCode::Char('x'));
     assert!(matches!(exported[..], [Command::Export(span)] if (span.from, span.to) == (4.0, 9.0)));
+    // It goes on behind, and says how far it has come.
+    send(&mut state, Event::Answer(Answer::Progress("save", 3, 6)));
+    assert!(screen_text(&state).contains("save ━━━━━╌╌╌╌╌ 3/6"));
+    send(&mut state, Event::Answer(Answer::Saved("frames-1".into())));
+    let text = screen_text(&state);
+    assert!(text.contains("written: frames-1") && !text.contains("3/6"));
     assert_eq!(press(&mut state, KeyCode::Char('q')), [Command::Quit]);
 }
 
