@@ -167,15 +167,12 @@ fn one_frame_is_a_point_and_no_curve() {
     insta::assert_snapshot!("one_frame_120x36", letters(&state));
 }
 
-/// Four of the bar's frames, far from each other, and stretched.
+/// Four of the bar's frames, far from each other.
 fn poses() -> Sequence {
     let all = bar(FRAMES);
-    let mut some = Vec::new();
-    for (frame, stretch) in [(0, 1.0), (4, 1.6), (10, 0.6), (13, 1.4)] {
-        let points = all.frame(frame).chunks_exact(3);
-        some.extend(points.flat_map(|at| [stretch * at[0], at[1], at[2]]));
-    }
-    Sequence::new(Arc::clone(all.topology()), some, None)
+    let frames = [0, 4, 10, 13].iter();
+    let some = frames.flat_map(|&frame| all.frame(frame).to_vec());
+    Sequence::new(Arc::clone(all.topology()), some.collect(), None)
 }
 
 /// The studio in letters with something that a recipe made.
