@@ -24,7 +24,9 @@ pub fn extend(loom: &Loom, frames: usize) -> Result<Warned<Loom>> {
     let last = loom.frames() as f64;
     if meets(loom.time()) {
         let passes = frames.div_ceil(loom.frames() - 1);
-        let looped = add_loop(loom, 1.0, last, passes, None)?;
+        // A pass takes as many frames each time as the way round: what shows is evened, not given more.
+        let bridge = bridge_for(loom.time(), 1.0, last);
+        let looped = add_loop(loom, 1.0, last, passes, Some(bridge))?;
         let all = Warned::from(looped);
         let mut warnings = all.warnings;
         let output = trim(&all.output, 1.0, last + frames as f64)?.unpack(&mut warnings);

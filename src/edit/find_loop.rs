@@ -65,10 +65,11 @@ mod tests {
 
     #[test]
     fn a_turn_of_the_ring_is_found() {
-        // one turn takes 20.27 frames
         let found = find_loop(&ring(10, 60, true), 8, 40).unwrap();
         let (from, to) = found.stretch;
-        assert!([20.0, 40.0].contains(&(to - from)), "{from} {to}");
+        // one turn takes 20.27 frames: 20 or 21, two of them 40
+        let turns = (to - from) / 20.27;
+        assert!((turns - turns.round()).abs() < 0.04, "{from} {to}");
         assert!(found.seam.worst() < 1.5);
     }
 

@@ -125,7 +125,7 @@ fn a_recipe_completes_meshes_and_remembers_it() {
             r#"complete(demo("bar").slice(1, 2), #{ frames: 3, at: [1] })"#,
             "which frames",
         ),
-        (r#"complete(5)"#, "keys must be a sequence"),
+        (r#"complete(5)"#, "keys must be frames"),
     ] {
         fs::write(folder.path().join("r.rhai"), wrong).unwrap();
         ran("run r.rhai").fails_with(&["r.rhai:1", part]);

@@ -28,7 +28,7 @@ const GAIN: f64 = 0.05;
 
 /// Below this relative error (root mean square) a step that gains less than this part ends it: lengths that
 /// a shape has are by then met ten times better a step, and others cannot be met much better.
-const NEAR: f64 = 2e-5;
+const NEAR: f64 = 2e-6;
 const SLOW: f64 = 0.75;
 
 /// Holds what edges leave free altogether (motions of a whole part), in parts of the mean diagonal.

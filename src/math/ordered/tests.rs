@@ -67,7 +67,11 @@ fn size_and_place_of_the_motion_do_not_matter() {
         let fit = fit(scaled.as_ref(), 0.0, &options(30), &Task::default()).unwrap();
         assert_eq!(fit.choice, reference.choice);
         // A hundred damped steps of a problem that is not convex amplify rounding: as good, not the same.
-        assert!(fit.quality.good && fit.quality.between < 2.0 * reference.quality.between);
+        let (found, expected) = (fit.quality, reference.quality);
+        assert!(
+            found.good && found.between < 2.0 * expected.between,
+            "{found:?} {expected:?}"
+        );
     }
 }
 
