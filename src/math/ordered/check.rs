@@ -20,10 +20,9 @@ const TRIAL: f64 = 3.0;
 /// Errors at the frames of so little are none.
 const EXACT: f64 = 5e-5;
 
-/// Weights grow by these powers of how many times what is allowed is missed, seen anywhere or known at
-/// frames, and by so much at most in one round.
+/// Weights grow by this power of how many times what is not seen is missed, and by so much at most in one
+/// round.
 const SEEN: f64 = 0.6;
-const FRAMES: f64 = 0.5;
 const GROWTH: f64 = std::f64::consts::SQRT_2;
 
 /// Deviations of g(f(t)) from the motion.
@@ -92,11 +91,9 @@ fn frames_allowed(floor: f64) -> f64 {
     (OF_FLOOR * floor).max(EXACT)
 }
 
-/// By what the weight of each fitted sample is to grow: more than 1 where more than is lost in `floor` is
-/// missed at a frame, or more than is not seen at a sample or next to it.
-pub(super) fn growth(samples: &Samples, at: &Mat<f64>, between: &Mat<f64>, floor: f64) -> Vec<f64> {
-    let checks = (2 * samples.rate * samples.frames) as f64;
-    let allowed = frames_allowed(floor) * samples.spread / checks.sqrt();
+/// By what the weight of each fitted sample is to grow: more than 1 where what is missed next to it is
+/// seen. Frames alone get no weight: what they gained, the way between them lost twice.
+pub(super) fn growth(samples: &Samples, at: &Mat<f64>, between: &Mat<f64>) -> Vec<f64> {
     let visible = VISIBLE * samples.step;
     let missed = &samples.finer - between;
     let seen = |row: usize| {
@@ -104,15 +101,7 @@ pub(super) fn growth(samples: &Samples, at: &Mat<f64>, between: &Mat<f64>, floor
         let largest = around.map(|row| missed.row(row).norm_l2());
         libm::pow(largest.fold(0.0, f64::max) / visible, SEEN)
     };
-    let known = |row: usize| {
-        let missed = (samples.dense.row(row) - at.row(row)).norm_l2();
-        libm::pow(missed / allowed, FRAMES)
-    };
-    let row = |row: usize| match row.is_multiple_of(samples.rate) {
-        true => seen(row).max(known(row)),
-        false => seen(row),
-    };
     (0..at.nrows())
-        .map(|sample| row(sample).clamp(1.0, GROWTH))
+        .map(|sample| seen(sample).clamp(1.0, GROWTH))
         .collect()
 }

@@ -1,5 +1,5 @@
-//! Layouts that respect the order: unrolled, where only consecutive samples and returning poses are near,
-//! and halfway from there to plain distances.
+//! Layouts that respect the order: from unrolled, where only consecutive samples and returning poses are
+//! near, halfway and, over the widest reach, all the way to plain distances.
 //!
 //! D0 are the distances of the samples, G those along the order graph with reach tau times their root
 //! mean square. A layout minimises the stress of D = D0^(1-theta) G^theta with weights
@@ -110,18 +110,16 @@ impl Order {
         Ok(walk)
     }
 
-    /// What is worth trying of a reach, the better map first: halfway, then unrolled.
+    /// What is worth trying of a reach, the better maps first: plain distances (of the widest reach, they are
+    /// the same for all), halfway, unrolled.
     pub(super) fn candidates(
         &self,
         tau: f64,
         graph: &Distances,
         task: &Task,
     ) -> Result<Vec<Candidate>, Cancelled> {
-        let halfway = Choice {
-            tau,
-            theta: HALFWAY,
-        };
-        let mut walk = self.walk(halfway, graph, task)?;
+        let theta = if tau == REACHES[0] { 0.0 } else { HALFWAY };
+        let mut walk = self.walk(Choice { tau, theta }, graph, task)?;
         walk.reverse();
         Ok(walk)
     }

@@ -279,8 +279,8 @@ impl Ground {
         Ok(self.fitted(draft, &curve, &candidate))
     }
 
-    /// Refined to the end, held less firmly: as long as more than allowed is missed somewhere and it helps
-    /// that this counts more.
+    /// Refined to the end, held less firmly: as long as more than allowed is missed somewhere and more rounds
+    /// help, in which what is seen counts more.
     fn firm(
         &self,
         draft: Draft,
@@ -297,7 +297,7 @@ impl Ground {
                 break;
             }
             next = next
-                .reweighted(samples, curve, self.floor)
+                .reweighted(samples, curve)
                 .refined(samples, curve, pins, round, task)?;
             let after = next.quality(samples, curve, self.floor).excess;
             idle += 1;

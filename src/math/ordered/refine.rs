@@ -178,10 +178,10 @@ impl Draft {
         Quality::of(samples, &at, &between, floor)
     }
 
-    /// The same, but samples count more where more than allowed is missed.
-    pub(super) fn reweighted(mut self, samples: &Samples, curve: &Curve, floor: f64) -> Self {
+    /// The same, but samples count more where what is missed is seen.
+    pub(super) fn reweighted(mut self, samples: &Samples, curve: &Curve) -> Self {
         let [at, between] = self.values(curve);
-        let growth = check::growth(samples, &at, &between, floor);
+        let growth = check::growth(samples, &at, &between);
         let weights = self.weights.iter_mut().zip(growth);
         weights.for_each(|(weight, growth)| *weight *= growth);
         let squares: f64 = self.weights.iter().map(|weight| weight * weight).sum();
