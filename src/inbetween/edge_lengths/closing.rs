@@ -23,9 +23,9 @@ const CLOSED: f64 = 1e-12;
 const IDLE: usize = 3;
 const GAIN: f64 = 0.5;
 
-/// Below this energy a walk (a ten-thousandth of a radian each) a step that gains less than this part ends
-/// it: walks that can close do so ten times better a step, and the finishing solve does the rest.
-const NEAR: f64 = 2e-8;
+/// Below this energy of all walks a step that gains less than this part ends it: walks that can close do so
+/// ten times better a step, and the finishing solve does the rest.
+const NEAR: f64 = 1e-7;
 const SLOW: f64 = 0.75;
 
 /// Damping, in parts of the mean diagonal: at the start and at most.
@@ -145,8 +145,7 @@ impl Closer {
             damping = (damping * if refused { 1.0 } else { 0.1 }).max(1e-12);
             refused = false;
             idle = if gain < GAIN { idle + 1 } else { 0 };
-            let near = NEAR * fans.closed() as f64;
-            if idle == IDLE || (energy < near && gain < SLOW) {
+            if idle == IDLE || (energy < NEAR && gain < SLOW) {
                 break;
             }
         }
