@@ -277,7 +277,7 @@ fn real(name: &str, frames: [usize; 2]) -> Option<([Vec<[f64; 3]>; 2], Vec<[usiz
 
 /// The inner vertex that stands out most over the vertices around it, and where it goes when it is pushed
 /// through their middle to the other side.
-fn pushed_in(points: &[[f64; 3]], triangles: &[[usize; 3]]) -> (usize, Vec<usize>, [f64; 3]) {
+fn pushed_in(points: &[[f64; 3]], triangles: &[[usize; 3]]) -> (usize, [f64; 3]) {
     let around = |vertex: usize| -> Vec<usize> {
         let with = triangles.iter().filter(|t| t.contains(&vertex)).flatten();
         let mut ring: Vec<usize> = with.copied().filter(|&v| v != vertex).collect();
@@ -303,7 +303,7 @@ fn pushed_in(points: &[[f64; 3]], triangles: &[[usize; 3]]) -> (usize, Vec<usize
         .unwrap();
     let middle = middle(&ring);
     let inside = std::array::from_fn(|k| 2.0 * middle[k] - points[vertex][k]);
-    (vertex, ring, inside)
+    (vertex, inside)
 }
 
 #[test]
@@ -312,7 +312,7 @@ fn a_jump_in_a_real_capture_is_named_and_nothing_else_is() {
         return;
     };
     let folder = tempdir().unwrap();
-    let (vertex, ring, inside) = pushed_in(&second, &triangles);
+    let (vertex, inside) = pushed_in(&second, &triangles);
     let mut popped = second.clone();
     popped[vertex] = inside;
     for (name, points) in [("a", &first), ("b", &second), ("popped", &popped)] {
@@ -332,10 +332,18 @@ fn a_jump_in_a_real_capture_is_named_and_nothing_else_is() {
     let found = morph("popped");
     let jumps = found["jumps"].as_array().unwrap();
     assert_eq!(jumps.len(), 1, "{found}");
-    // the edge is one at the vertex or around it, counted from 1
+    // the edge, counted from 1, lies about the vertex: within a tenth of the body
+    let apart = |a: [f64; 3], b: [f64; 3]| {
+        let square: f64 = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum();
+        square.sqrt()
+    };
+    let size = second
+        .iter()
+        .map(|&p| apart(p, second[0]))
+        .fold(0.0, f64::max);
     for end in jumps[0]["edge"].as_array().unwrap() {
         let end = end.as_u64().unwrap() as usize - 1;
-        assert!(end == vertex || ring.contains(&end), "{found}");
+        assert!(apart(second[end], second[vertex]) < 0.1 * size, "{found}");
     }
     // frames that are blended across the jump miss lengths about it; the others keep them
     assert!(found["within_percent"].as_f64().unwrap() >= 95.0, "{found}");

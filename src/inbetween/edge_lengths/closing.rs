@@ -29,7 +29,7 @@ const NEAR: f64 = 1e-7;
 const SLOW: f64 = 0.75;
 
 /// Damping, in parts of the mean diagonal: at the start and at most.
-const DAMPING: [f64; 2] = [1e-3, 1e4];
+const DAMPING: [f64; 2] = [1e-2, 1e4];
 
 /// What the iteration did.
 #[derive(Debug, Clone, Copy, PartialEq)]
