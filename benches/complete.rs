@@ -207,7 +207,7 @@ fn in_hand() -> usize {
         let mut controls = start.controls().clone();
         controls.times[1] += f64::from(turn);
         let clock = Instant::now();
-        let moved = start.with(controls, &task).expect("a motion");
+        let moved = start.with(&controls, &task).expect("a motion");
         black_box((moved.plots(), moved.motion().at(20.0)));
         best = best.min(1e3 * clock.elapsed().as_secs_f64());
     }

@@ -247,7 +247,7 @@ fn live(args: &Args, path: &Path, runs: Runs, session: &Session) -> Result<Outco
         }
         // What was saved before it was watched has to be asked for.
         let mut look = true;
-        while !interrupted && !(look && reading.changed(None)) {
+        while !(interrupted || look && reading.changed(None)) {
             let now = reading.folders();
             look = now != folders;
             if look {

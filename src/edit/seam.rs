@@ -94,7 +94,7 @@ impl Seam {
         let [step, velocity, acceleration] = [0, 1, 2].map(|kind| {
             let shown = new[kind].iter().enumerate().map(|(i, found)| {
                 // Its first frame is i + 1, its last i + 1 + order.
-                let before = (i + 1 + orders[kind] <= last).then(|| i);
+                let before = (i + 1 + orders[kind] <= last).then_some(i);
                 let after = (i + 1 >= next).then(|| i + first - next);
                 match before.or(after).and_then(|i| own[kind].get(i)) {
                     Some(own) => norm(&minus(found, own)),

@@ -13,7 +13,7 @@ const TORN: f64 = 10.0;
 const CHUNK: usize = 2048;
 
 /// How much each triangle is to count, in (0, 1], for shapes of 3V positions: 1 for one that is not torn;
-/// the sixth power of [`TORN`] over the change of its longest side for one that is. Sides are
+/// the sixth power of `TORN` over the change of its longest side for one that is. Sides are
 /// measured by the median of all longest sides in the same shape, so shapes may have any size. Empty where no
 /// triangle is torn. A triangle without a side in some shape is as torn as one that changes a thousandfold.
 pub fn torn(triangles: &[[u32; 3]], shapes: &[&[f64]]) -> Vec<f64> {

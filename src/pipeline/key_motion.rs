@@ -72,10 +72,10 @@ impl KeyMotion {
     ///
     /// # Errors
     /// Times that do not rise, handles out of their range, another number of either than keys.
-    pub fn with(&self, controls: KeyControls, task: &Task) -> Result<Self> {
+    pub fn with(&self, controls: &KeyControls, task: &Task) -> Result<Self> {
         let completion = Completion {
             keys: self.completion.keys.clone(),
-            request: self.completion.request.with(&controls),
+            request: self.completion.request.with(controls),
         };
         self.after(completion, task)
     }
@@ -395,9 +395,7 @@ mod tests {
         for of in [&|request| request, &hermite, &limited] as [&dyn Fn(_) -> CompleteRequest; 3] {
             let known = cactus(of(bent()));
             let start = cactus(of(CompleteRequest::default()));
-            let found = start
-                .with(known.controls().clone(), &Task::default())
-                .unwrap();
+            let found = start.with(known.controls(), &Task::default()).unwrap();
             assert_eq!(found.frames(), known.frames());
             for time in [0.0, 4.0, 17.5, 30.0] {
                 assert_eq!(found.motion().at(time), known.motion().at(time));
@@ -500,7 +498,7 @@ mod tests {
             times: Some(moved.times.clone()),
             ..ghost.completion().request.clone()
         };
-        let found = ghost.with(moved, &Task::default()).unwrap();
+        let found = ghost.with(&moved, &Task::default()).unwrap();
         assert_eq!(found.motion().at(5.0), cactus(known).motion().at(5.0));
     }
 
@@ -516,7 +514,7 @@ mod tests {
                 times: times.to_vec(),
                 handles: vec![handle; 3],
             };
-            motion.with(controls, &Task::default()).is_err()
+            motion.with(&controls, &Task::default()).is_err()
         };
         assert!(!with(&[1.0, 2.0, 3.0], 0.0));
         assert!(with(&[1.0, 1.0, 3.0], 0.0) && with(&[1.0, 3.0], 0.0));

@@ -184,7 +184,7 @@ impl Statistics {
     /// # Errors
     /// None that finite poses can cause.
     pub fn mean(&self) -> Result<Warned<Found<Shape>>> {
-        self.shape("mean".to_string(), &self.population.along(0, 0.0))
+        self.shape("mean", &self.population.along(0, 0.0))
     }
 
     /// The shape `sigmas` standard deviations along a mode, counted from 1.
@@ -201,7 +201,7 @@ impl Statistics {
             .err();
         }
         let name = format!("mode {mode}, {sigmas} sigma");
-        self.shape(name, &self.population.along(mode - 1, sigmas))
+        self.shape(&name, &self.population.along(mode - 1, sigmas))
     }
 
     /// [`SAMPLES`] shapes along a mode, counted from 1, from -2 to 2 standard deviations.
@@ -231,7 +231,7 @@ impl Statistics {
     }
 
     /// The shape `along` the first modes from the mean.
-    fn shape(&self, name: String, along: &[f64]) -> Result<Warned<Found<Shape>>> {
+    fn shape(&self, name: &str, along: &[f64]) -> Result<Warned<Found<Shape>>> {
         let code = self.population.at(along);
         let found = self.ground.decode(&code, &self.population.weights(along))?;
         let told = told_of(&self.ground, &code, &found);
@@ -240,7 +240,7 @@ impl Statistics {
                 output: shape(&self.topology, &found.positions),
                 returned: found
                     .by
-                    .map(|by| ReturnedReport::new(name.clone(), by))
+                    .map(|by| ReturnedReport::new(name.to_string(), by))
                     .into_iter()
                     .collect(),
             },
@@ -271,7 +271,7 @@ impl Statistics {
     /// None that finite places can cause.
     pub fn shape_of(&self, place: [f64; 2]) -> Result<Warned<Shape>> {
         let modes = self.modes().min(2);
-        let found = self.shape("the shape there".to_string(), &place[..modes])?;
+        let found = self.shape("the shape there", &place[..modes])?;
         Ok(found.map(|found| found.output))
     }
 

@@ -61,7 +61,7 @@ impl KeyScene {
     /// # Errors
     /// As [`KeyMotion::with`].
     pub(super) fn with(&self, controls: &KeyControls, task: &Task) -> Result<Content> {
-        let motion = self.motion().with(controls.clone(), task)?;
+        let motion = self.motion().with(controls, task)?;
         let (map, mut times) = motion.plots();
         // What lies under the hand stays there.
         times.window = self.signals.0.times.window;

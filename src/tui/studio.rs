@@ -373,7 +373,7 @@ impl Studio {
             let mut interview = Interview::new(options);
             let (answers, typed) = terminal::ask_while_typed_at(interview.options.tmux);
             interview.hear(answers, &events);
-            for event in typed.into_iter().filter_map(heard) {
+            for event in typed.into_iter().filter_map(|event| heard(&event)) {
                 let _ = events.send(event);
             }
             let (begin, mut late) = (Instant::now(), LateAnswer::default());
@@ -395,7 +395,7 @@ impl Studio {
                     }
                     continue;
                 }
-                let event = event.map_or(Some(Event::Signal), heard);
+                let event = event.map_or(Some(Event::Signal), |event| heard(&event));
                 if event.is_some_and(|event| events.send(event).is_err()) {
                     return;
                 }
@@ -433,8 +433,8 @@ impl Studio {
 }
 
 /// What the keyboard says, as far as it is listened to.
-fn heard(event: keyboard::Event) -> Option<Event> {
-    match event {
+fn heard(event: &keyboard::Event) -> Option<Event> {
+    match *event {
         keyboard::Event::Key(key) if key.kind != KeyEventKind::Release => Some(Event::Key(key)),
         keyboard::Event::Mouse(mouse) => Some(Event::Mouse(mouse)),
         keyboard::Event::Resize(columns, rows) => Some(Event::Resize(columns, rows)),

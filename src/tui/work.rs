@@ -291,7 +291,7 @@ impl Brush {
                 Err(_) => return,
             },
             Pose::Motion(scene, time) => {
-                narrow(&scene.of.0.motion().at(*time), &mut self.positions)
+                narrow(&scene.of.0.motion().at(*time), &mut self.positions);
             }
             Pose::KeyPlace(scene, at) => match scene.of.0.shape_of(*at) {
                 Some(positions) => narrow(&positions, &mut self.positions),

@@ -52,8 +52,8 @@ pub fn from_tensors(tensors: Vec<Tensor>, metadata: &str) -> Result<Loom> {
         report: Arc::new(metadata.report),
         topology,
     })?;
-    // Negated, so that what is no number is refused too.
-    if !(reach::bound(&loom)? <= reach::FARTHEST) {
+    // What is no number lies in no range.
+    if !(0.0..=reach::FARTHEST).contains(&reach::bound(&loom)?) {
         return Err(faulty(
             "signals",
             "their frames lie beyond single precision",

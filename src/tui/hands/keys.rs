@@ -132,7 +132,7 @@ impl KeyHeld {
     }
 
     /// Takes it to a time, between its neighbours.
-    fn to_time(&mut self, time: f64) {
+    fn put_at(&mut self, time: f64) {
         let times = &mut self.controls.times;
         let least = APART * (self.before.times[times.len() - 1] - self.before.times[0]);
         let low = self.key.checked_sub(1).map(|before| times[before] + least);
@@ -272,7 +272,7 @@ pub(super) fn pressed(state: &mut State, name: &str) -> Option<Vec<Command>> {
                 "up" => 0.1,
                 _ => -0.1,
             };
-            held.to_time(held.controls.times[held.key] + far * step);
+            held.put_at(held.controls.times[held.key] + far * step);
         }
         (Grip::Time, _) => return None,
         (_, "up") => held.turn(far, 0.0, 0.0),
@@ -362,7 +362,7 @@ pub(super) fn dragged(state: &mut State, place: [f64; 2]) -> Vec<Command> {
                 true => 1.0,
                 false => 0.1,
             };
-            held.to_time((place[0] / step).round() * step);
+            held.put_at((place[0] / step).round() * step);
         }
         Grip::Arm(side, corner) => {
             let before = held.before.handles[held.key];
