@@ -133,13 +133,15 @@ impl Row {
             solve.space().decode(&coordinates, &mut small);
         });
         let t_transfer = best(7, || solve.evaluate(middle, &mut shape)) - t_ghost;
-        let behind = shapes(keys, solve);
+        let behind = shapes(keys, &solve);
+        drop(solve);
         let direct = motion(keys, "patch-lri", ghost(Lift::Direct));
         let t_direct = best(7, || direct.evaluate(middle, &mut shape));
         drop(direct);
         let full = motion(keys, "patch-lri", whole());
         let t_whole = best(3, || full.evaluate(middle, &mut shape));
-        let kg = metric::compare(&shapes(keys, full), &behind, &Task::default());
+        let kg = metric::compare(&shapes(keys, &full), &behind, &Task::default());
+        drop(full);
         let kg = kg.map_or(f64::NAN, |found| found.vertices.kg_percent);
         let plain = motion(keys, "vertices", whole());
         let t_plain = best(7, || plain.evaluate(middle, &mut shape));
@@ -165,8 +167,8 @@ impl Row {
     }
 }
 
-/// 13 shapes of a motion, from the first key to the last, the motion dropped.
-fn shapes(keys: &Keys, motion: Motion) -> Sequence {
+/// 13 shapes of a motion, from the first key to the last.
+fn shapes(keys: &Keys, motion: &Motion) -> Sequence {
     let [first, last] = keys.ends();
     let shapes = (0..13).flat_map(|i| motion.at(first + (last - first) * f64::from(i) / 12.0));
     let positions = shapes.map(|x| x as f32).collect();

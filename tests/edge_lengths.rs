@@ -260,11 +260,11 @@ fn the_same_bytes_on_any_number_of_threads() {
     assert_eq!(written(1), written(2));
 }
 
-/// A point in space.
-type Point = [f64; 3];
+/// Points, three numbers each.
+type Points = Vec<[f64; 3]>;
 
 /// Two frames of a real capture, as points and triangles.
-fn real(name: &str, frames: [usize; 2]) -> Option<([Vec<Point>; 2], Vec<[usize; 3]>)> {
+fn real(name: &str, frames: [usize; 2]) -> Option<([Points; 2], Vec<[usize; 3]>)> {
     let folder = support::real_captures()?.join(name);
     let (world, task) = (meshloom::io::Disk, meshloom::task::Task::default());
     let spec = meshloom::pipeline::InputSpec::new(folder);
