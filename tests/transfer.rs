@@ -216,23 +216,31 @@ fn time_stays_and_an_edit_before_or_after_is_the_same() {
     }
 }
 
-#[test]
-fn a_motion_beyond_a_half_turn_reaches_its_examples() {
+/// Bends of two tubes up to where their ends turn by 4 radians each: branches drawn from frame to frame are
+/// not principal.
+const BENDS: [f64; 3] = [0.0, 4.0, 8.0];
+
+/// The tube that moves and its points, the points of the other tube, and both bent by [`BENDS`].
+fn bent_examples() -> (Arc<Topology>, Vec<f64>, Vec<f64>, Examples) {
     let (source, points) = tube(24, 8, 0.4);
     let (target, others) = tube(19, 10, 0.3);
-    // the ends of the tube turn by 4 radians each: branches drawn from frame to frame are not principal
-    let bends = [0.0, 4.0, 8.0];
     let poses = |topology: &Arc<Topology>, points: &[f64]| {
-        sequence(topology, &bends.map(|bend| posed(points, bend, 0.0)))
+        sequence(topology, &BENDS.map(|bend| posed(points, bend, 0.0)))
     };
     let examples = Examples::new(poses(&source, &points), poses(&target, &others)).unwrap();
+    (source, points, others, examples)
+}
+
+#[test]
+fn a_motion_beyond_a_half_turn_reaches_its_examples() {
+    let (source, points, others, examples) = bent_examples();
     let frames: Vec<Vec<f64>> = (0..9).map(|i| posed(&points, f64::from(i), 0.0)).collect();
     for space in SPACES {
         let loom = exact(&sequence(&source, &frames), space.name);
         let found = transfer(&loom, &examples, &Task::default()).unwrap().output;
         for (frame, example) in [(0, 0), (4, 1), (8, 2)] {
             let shape = found.loom.at((frame + 1) as f64).unwrap();
-            let error = farthest(&shape, &posed_f32(&others, bends[example]));
+            let error = farthest(&shape, &posed_f32(&others, BENDS[example]));
             assert!(error < ROUNDING, "{}, frame {frame}: {error}", space.name);
             assert!(found.coverage[frame] < 1e-5, "{}", space.name);
         }
@@ -241,13 +249,7 @@ fn a_motion_beyond_a_half_turn_reaches_its_examples() {
 
 #[test]
 fn a_loom_about_another_pose_draws_its_branches_from_frame_to_frame() {
-    let (source, points) = tube(24, 8, 0.4);
-    let (target, others) = tube(19, 10, 0.3);
-    let bends = [0.0, 4.0, 8.0];
-    let poses = |topology: &Arc<Topology>, points: &[f64]| {
-        sequence(topology, &bends.map(|bend| posed(points, bend, 0.0)))
-    };
-    let examples = Examples::new(poses(&source, &points), poses(&target, &others)).unwrap();
+    let (source, points, others, examples) = bent_examples();
     // from the far end, the reference pose in the middle of the motion, and back
     let motion = [8, 7, 6, 5, 4, 3, 2, 1, 0, 2, 4, 6, 8];
     let frames: Vec<Vec<f64>> = motion
@@ -259,7 +261,7 @@ fn a_loom_about_another_pose_draws_its_branches_from_frame_to_frame() {
         let found = transfer(&loom, &examples, &Task::default()).unwrap().output;
         for (frame, example) in [(0, 2), (4, 1), (8, 0), (10, 1), (12, 2)] {
             let shape = found.loom.at((frame + 1) as f64).unwrap();
-            let error = farthest(&shape, &posed_f32(&others, bends[example]));
+            let error = farthest(&shape, &posed_f32(&others, BENDS[example]));
             assert!(
                 error < 4.0 * ROUNDING,
                 "{}, frame {frame}: {error}",

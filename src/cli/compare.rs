@@ -2,13 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use serde_json::json;
-
 use super::args::Part;
 use super::report;
 use super::session::{Outcome, Session};
 use crate::diag::{Diagnostic, Result};
 use crate::metric::{self, Comparison, MetricError};
+use crate::pipeline::compared;
 use crate::task::Cancelled;
 
 /// Measure how far one sequence is from another
@@ -36,14 +35,7 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<Outcome> {
     let found = metric::compare(&*first, &*second, &session.task)
         .map_err(|error| explained(&error, &args.second))?;
     Ok(Outcome {
-        object: json!({
-            "frames": found.frames,
-            "kg_percent": found.vertices.kg_percent,
-            "rms": found.vertices.rms,
-            "max": found.vertices.max,
-            "edge_rms_percent": found.edges.rms_percent,
-            "edge_max_percent": found.edges.max_percent,
-        }),
+        object: compared(&found),
         report: report(args, session, &found),
         ..Outcome::default()
     })

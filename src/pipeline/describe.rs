@@ -1,10 +1,11 @@
-//! What a capture is.
+//! What a capture is, and how far one is from another.
 
 use serde::Serialize;
 
 use super::open::Capture;
 use crate::diag::{Diagnostic, Result};
 use crate::mesh::{Bounds, Edges};
+use crate::metric::Comparison;
 
 /// What a capture is: its counts, its surface, its place in space, where it came from.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -55,5 +56,18 @@ pub fn describe(capture: &Capture) -> Result<Description> {
         fps: frames.fps(),
         format: capture.origin.format,
         bytes: capture.origin.bytes,
+    })
+}
+
+/// What a comparison found under the names that the command line and recipes give it: `frames`,
+/// `kg_percent`, `rms`, `max`, `edge_rms_percent`, `edge_max_percent`.
+pub fn compared(found: &Comparison) -> serde_json::Value {
+    serde_json::json!({
+        "frames": found.frames,
+        "kg_percent": found.vertices.kg_percent,
+        "rms": found.vertices.rms,
+        "max": found.vertices.max,
+        "edge_rms_percent": found.edges.rms_percent,
+        "edge_max_percent": found.edges.max_percent,
     })
 }

@@ -35,7 +35,7 @@ mod workbench;
 
 pub use complete::{CompleteRequest, Velocities, complete, motion};
 pub use deliver::{deliver, plan_delivery};
-pub use describe::{Description, describe};
+pub use describe::{Description, compared, describe};
 pub use find::{Listing, files};
 pub use input::{FrameRange, InputSpec};
 pub use key::{Key, KeyBuilder};

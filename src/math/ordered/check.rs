@@ -93,7 +93,7 @@ fn frames_allowed(floor: f64) -> f64 {
 
 /// By what the weight of each fitted sample is to grow: more than 1 where what is missed next to it is
 /// seen. Frames alone get no weight: what they gained, the way between them lost twice.
-pub(super) fn growth(samples: &Samples, at: &Mat<f64>, between: &Mat<f64>) -> Vec<f64> {
+pub(super) fn growth(samples: &Samples, between: &Mat<f64>) -> Vec<f64> {
     let visible = VISIBLE * samples.step;
     let missed = &samples.finer - between;
     let seen = |row: usize| {
@@ -101,7 +101,7 @@ pub(super) fn growth(samples: &Samples, at: &Mat<f64>, between: &Mat<f64>) -> Ve
         let largest = around.map(|row| missed.row(row).norm_l2());
         libm::pow(largest.fold(0.0, f64::max) / visible, SEEN)
     };
-    (0..at.nrows())
+    (0..samples.dense.nrows())
         .map(|sample| seen(sample).clamp(1.0, GROWTH))
         .collect()
 }

@@ -6,6 +6,7 @@ use super::check::{self, Quality};
 use super::layout::Candidate;
 use super::samples::{Curve, Samples};
 use crate::math::b_spline::Point;
+use crate::math::uniform_spline::UniformDesign;
 use crate::math::variable_projection::{self, Options, Plate, Problem, Refined};
 use crate::task::{Cancelled, Task};
 
@@ -174,14 +175,13 @@ impl Draft {
 
     /// How good it is at the samples and between them.
     pub(super) fn quality(&self, samples: &Samples, curve: &Curve, floor: f64) -> Quality {
-        let [at, between] = self.values(curve);
-        Quality::of(samples, &at, &between, floor)
+        let at = self.value(curve.fitted.design());
+        Quality::of(samples, &at, &self.value(&curve.finer), floor)
     }
 
     /// The same, but samples count more where what is missed is seen.
     pub(super) fn reweighted(mut self, samples: &Samples, curve: &Curve) -> Self {
-        let [at, between] = self.values(curve);
-        let growth = check::growth(samples, &at, &between);
+        let growth = check::growth(samples, &self.value(&curve.finer));
         let weights = self.weights.iter_mut().zip(growth);
         weights.for_each(|(weight, growth)| *weight *= growth);
         let squares: f64 = self.weights.iter().map(|weight| weight * weight).sum();
@@ -190,10 +190,10 @@ impl Draft {
         self
     }
 
-    /// g(f(t)) at the fitted and at the check samples.
-    fn values(&self, curve: &Curve) -> [Mat<f64>; 2] {
-        [curve.fitted.design(), &curve.finer]
-            .map(|design| self.plate.at(design.apply(self.controls.as_ref()).as_ref()))
+    /// g(f(t)) at the samples of a design.
+    fn value(&self, design: &UniformDesign) -> Mat<f64> {
+        let curve = design.apply(self.controls.as_ref());
+        self.plate.at(curve.as_ref())
     }
 }
 

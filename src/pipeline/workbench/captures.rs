@@ -12,7 +12,7 @@ use crate::metric;
 use crate::pipeline::key::Key;
 use crate::pipeline::names::pose_names;
 use crate::pipeline::value::{Frames, Keyed, LoomValue, Shape, ShapeValue, content_key};
-use crate::pipeline::{FrameRange, InputSpec, Listing, files, open, open_loom};
+use crate::pipeline::{FrameRange, InputSpec, Listing, compared, files, open, open_loom};
 
 impl Workbench {
     /// A capture from files, of looms their frames.
@@ -150,14 +150,7 @@ impl Workbench {
     pub fn compare(&self, first: &Frames, second: &Frames) -> Result<serde_json::Value> {
         let found = metric::compare(&*first.value, &*second.value, &self.task);
         let found = found.map_err(|error| Diagnostic::error(error.to_string()))?;
-        Ok(serde_json::json!({
-            "frames": found.frames,
-            "kg_percent": found.vertices.kg_percent,
-            "rms": found.vertices.rms,
-            "max": found.vertices.max,
-            "edge_rms_percent": found.edges.rms_percent,
-            "edge_max_percent": found.edges.max_percent,
-        }))
+        Ok(compared(&found))
     }
 
     /// The key of what files hold, by their identities: they are not read.
