@@ -21,6 +21,10 @@ use meshloom::plot::{Chart, Panel, Series, Style, Theme, Tint, chart};
 use meshloom::task::Task;
 use support::{Figure, table};
 
+/// Keys of the demo, and frames from one to the next.
+const KEYS: usize = 10;
+const EVERY: usize = 3;
+
 /// Steps from key to key.
 const STEPS: usize = 12;
 
@@ -30,7 +34,7 @@ fn main() -> ExitCode {
 
 fn draw(figure: &mut Figure) -> Result<()> {
     let keys = if figure.is_demo() {
-        let frames: Vec<usize> = (0..10).map(|i| 3 * i).collect();
+        let frames: Vec<usize> = (0..KEYS).map(|i| EVERY * i).collect();
         demo_keys("gallop", &frames, 0)
     } else {
         Keys::new(figure.capture("")?.0, None)?
@@ -105,6 +109,13 @@ fn draw(figure: &mut Figure) -> Result<()> {
         .collect();
     println!("in units of the spline's median, {of_spline:.2e}:");
     table(&["path", "median", "peak at a key", "highest"], &table_rows);
+    if figure.is_demo() {
+        let peaks = of_the_capture(keys.times(), &times, step)?;
+        let [typical, highest] = [peaks.typical, peaks.highest].map(|peak| peak / peaks.median);
+        println!(
+            "the gallop that the keys are taken from, by itself: {typical:.2} times its median about a key, {highest:.2} at most"
+        );
+    }
     println!("X19: geodesics \"very large around the key-frames\", splines small throughout");
     figure.goal(
         "the spline's peaks at keys are at most 1.5 times the median",
@@ -127,6 +138,20 @@ fn draw(figure: &mut Figure) -> Result<()> {
         ..Chart::default()
     };
     figure.picture(&chart(&both, 900.0, 420.0, &Theme::light()).0)
+}
+
+/// What the motion that the keys were taken from does about them: all its frames as keys.
+fn of_the_capture(keys: &[f64], times: &[f64], step: f64) -> Result<Peaks> {
+    let frames: Vec<usize> = (0..=EVERY * (KEYS - 1)).collect();
+    let whole = motion(&demo_keys("gallop", &frames, 0), "patch-lri")?;
+    let width = whole.spline().width();
+    let mut rows = vec![0.0; times.len() * width];
+    for (time, row) in times.iter().zip(rows.chunks_exact_mut(width)) {
+        let frame = 1.0 + EVERY as f64 * (time - times[0]);
+        whole.spline().evaluate(frame, row);
+    }
+    let sizes = second_differences(&rows, width, step);
+    Ok(Peaks::at_keys(&times[1..times.len() - 1], &sizes, keys))
 }
 
 fn motion(keys: &Keys, space: &str) -> Result<Motion> {

@@ -3,12 +3,12 @@
 pub mod b_spline;
 pub mod banded;
 pub mod block_sparse;
+pub mod columns;
 pub mod cubic_spline;
 pub mod curve_join;
 pub mod direction;
 pub mod growing_qr;
 pub mod key_spline;
-pub mod lanes;
 pub mod layout;
 pub mod least_squares;
 pub mod monotone;

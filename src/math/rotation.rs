@@ -8,8 +8,6 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3, Vector4};
 
-use super::lanes::{LANES, Lanes, Vectors, dot, times};
-
 /// The rotation by |w| radians about w. Rotations by more than a half turn are allowed.
 pub fn exp(w: &Vector3<f64>) -> UnitQuaternion<f64> {
     let angle = w.norm();
@@ -26,6 +24,7 @@ pub fn exp(w: &Vector3<f64>) -> UnitQuaternion<f64> {
 ///
 /// With w = cos(a/2) >= 0 and s = sin(a/2), t = s / (1 + w) is tan(a/4), at most 1, and
 /// u = t / (1 + sqrt(1 + t^2)) is tan(a/8): the angle a is 8 atan(u), and a/s needs neither s nor a case.
+#[inline(always)]
 pub fn log(rotation: &UnitQuaternion<f64>) -> Vector3<f64> {
     let sign = if rotation.w < 0.0 { -1.0 } else { 1.0 };
     let axis = rotation.imag();
@@ -35,48 +34,8 @@ pub fn log(rotation: &UnitQuaternion<f64>) -> Vector3<f64> {
     axis * (8.0 * sign * atan_over(t / (half * half)) / (below * half))
 }
 
-/// [`log`] of four unit quaternions (w, x, y, z) side by side.
-#[inline]
-pub fn logs([w, x, y, z]: &[Lanes; 4]) -> Vectors {
-    let one = Lanes::splat(1.0);
-    let sign = Lanes::of(|lane| if w.0[lane] < 0.0 { -1.0 } else { 1.0 });
-    let axis = [*x, *y, *z];
-    let below = one + sign * *w;
-    let t = dot(&axis, &axis) * (below * below).recip();
-    let half = one + (one + t).sqrt();
-    let u = t * (half * half).recip();
-    let series = COEFFICIENTS
-        .iter()
-        .fold(Lanes::splat(0.0), |sum, c| sum * u + Lanes::splat(*c));
-    let factor = Lanes::splat(8.0) * sign * series * (below * half).recip();
-    times(&axis, factor)
-}
-
-/// a b for four pairs of quaternions (w, x, y, z).
-#[inline]
-pub fn products(a: &[Lanes; 4], b: &[Lanes; 4]) -> [Lanes; 4] {
-    let ([aw, ax, ay, az], [bw, bx, by, bz]) = (*a, *b);
-    [
-        aw * bw - ax * bx - ay * by - az * bz,
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-    ]
-}
-
-/// Four rotations as quaternions (w, x, y, z).
-#[inline]
-pub fn quaternions(rotation: impl FnMut(usize) -> UnitQuaternion<f64>) -> [Lanes; 4] {
-    let rows: [UnitQuaternion<f64>; LANES] = std::array::from_fn(rotation);
-    [
-        Lanes::of(|lane| rows[lane].w),
-        Lanes::of(|lane| rows[lane].i),
-        Lanes::of(|lane| rows[lane].j),
-        Lanes::of(|lane| rows[lane].k),
-    ]
-}
-
 /// atan(u) / u for z = u^2 up to tan(pi/8)^2, to rounding.
+#[inline(always)]
 fn atan_over(z: f64) -> f64 {
     COEFFICIENTS.iter().fold(0.0, |sum, c| sum * z + c)
 }
@@ -288,21 +247,6 @@ mod tests {
     }
 
     proptest! {
-        #[test]
-        fn four_at_once_are_as_one_by_one(w in prop::array::uniform4(vector(9.0))) {
-            let turns = w.map(|w| exp(&w));
-            let four = quaternions(|lane| turns[lane]);
-            let back = quaternions(|lane| turns[3 - lane].inverse());
-            let (alone, relative) = (logs(&four), logs(&products(&back, &four)));
-            for lane in 0..4 {
-                let of = |v: &Vectors| Vector3::from(v.map(|x| x.0[lane]));
-                prop_assert!((of(&alone) - log(&turns[lane])).norm() < 1e-14);
-                let expected = turns[3 - lane].inverse() * turns[lane];
-                // near a half turn either vector is right
-                prop_assert!(log(&(exp(&of(&relative)).inverse() * expected)).norm() < 1e-13);
-            }
-        }
-
         #[test]
         fn log_undoes_exp_up_to_whole_turns(w in vector(12.0)) {
             // the angle is good to an ulp of 21 radians

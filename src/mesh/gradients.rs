@@ -9,7 +9,6 @@ use std::f64::consts::FRAC_PI_3;
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-use crate::math::lanes::{LANES, Lanes, Vectors, cross, dot, minus, times, vectors};
 use crate::math::rotation;
 
 /// A triangle of the reference pose, laid in its own plane: corners 0, `length` b1 and
@@ -35,7 +34,7 @@ pub struct ReferenceTriangle {
 const FLAT: f64 = 1e-6;
 
 /// Below this sine of the angle between its sides a triangle of a shape has no normal of its own.
-const COLLINEAR: f64 = 1e-10;
+pub(super) const COLLINEAR: f64 = 1e-10;
 
 impl ReferenceTriangle {
     /// The triangle with these corners. A triangle without a plane (collinear or coincident corners, or
@@ -152,13 +151,9 @@ impl ReferenceTriangle {
         }
     }
 
-    /// S as xx, xy, xz, yy, yz, zz of the symmetric 3 x 3 matrix, from its entries in the plane; S
-    /// leaves the normal alone.
-    pub fn stretch_in_space(&self, [s11, s12, s22]: [f64; 3]) -> [f64; 6] {
-        let (b1, b2, n) = (self.along, self.across(), self.normal);
-        let (u1, u2) = (b1 * s11 + b2 * s12, b1 * s12 + b2 * s22);
-        let entry = |i: usize, j: usize| u1[i] * b1[j] + u2[i] * b2[j] + n[i] * n[j];
-        upper_triangle(entry)
+    /// [`stretch_in_space`] of this triangle.
+    pub fn stretch_in_space(&self, stretch: [f64; 3]) -> [f64; 6] {
+        stretch_in_space(&self.along, &self.normal, stretch)
     }
 
     /// S b1 and S b2 for S as xx, xy, xz, yy, yz, zz.
@@ -185,96 +180,17 @@ pub struct Polar {
     pub stretch: [f64; 3],
 }
 
-/// The polar factors of four triangles that need no care.
-#[derive(Debug, Clone, Copy)]
-pub struct Polars {
-    /// R as a matrix, row by row.
-    pub matrix: [Vectors; 3],
-    /// R as a quaternion (w, x, y, z).
-    pub quaternion: [Lanes; 4],
-    /// s11, s12, s22 as in [`Polar`].
-    pub stretch: [Lanes; 3],
-}
-
-/// [`ReferenceTriangle::polar`] of four triangles side by side, for shapes' sides `e1` and `e2`. None where
-/// one of them has no plane, in the reference or the shape, or is turned by more than 138 degrees (trace
-/// below -1/2), where the quaternion would lose digits: then take them one by one.
+/// S of a triangle with `along` and `normal` as xx, xy, xz, yy, yz, zz, from its entries s11, s12, s22 in the
+/// plane; S leaves the normal alone.
 #[inline(always)]
-pub fn polars(
-    triangles: &[ReferenceTriangle; LANES],
-    e1: &Vectors,
-    e2: &Vectors,
-) -> Option<Polars> {
-    let along = vectors(|lane| triangles[lane].along.into());
-    let normal = vectors(|lane| triangles[lane].normal.into());
-    let length = Lanes::of(|lane| triangles[lane].length);
-    let offset = Lanes::of(|lane| triangles[lane].offset);
-    let height = Lanes::of(|lane| triangles[lane].height);
-    let product = cross(e1, e2);
-    let size = dot(&product, &product).sqrt();
-    let n = times(&product, size.recip());
-    let f1 = times(e1, length.recip());
-    let f2 = times(&minus(e2, &times(&f1, offset)), height.recip());
-    let towards = minus(&f1, &cross(&n, &f2));
-    let r1 = times(&towards, dot(&towards, &towards).sqrt().recip());
-    let r2 = cross(&n, &r1);
-    let across = cross(&normal, &along);
-    let entry = |i: usize, j: usize| r1[i] * along[j] + r2[i] * across[j] + n[i] * normal[j];
-    let row = |i: usize| [entry(i, 0), entry(i, 1), entry(i, 2)];
-    let matrix = [row(0), row(1), row(2)];
-    let trace = matrix[0][0] + matrix[1][1] + matrix[2][2];
-    let sides = dot(e1, e1) + dot(e2, e2);
-    // written so that what is not a number is not plain
-    let plain = |lane: usize| {
-        trace.0[lane] > -0.5
-            && size.0[lane] > COLLINEAR * sides.0[lane]
-            && size.0[lane].is_finite()
-            && !triangles[lane].degenerate
-    };
-    if !(0..LANES).all(plain) {
-        return None;
-    }
-    let (one, half) = (Lanes::splat(1.0), Lanes::splat(0.5));
-    let root = (one + trace).sqrt();
-    let scale = half * root.recip();
-    Some(Polars {
-        quaternion: [
-            half * root,
-            (matrix[2][1] - matrix[1][2]) * scale,
-            (matrix[0][2] - matrix[2][0]) * scale,
-            (matrix[1][0] - matrix[0][1]) * scale,
-        ],
-        matrix,
-        stretch: [
-            dot(&r1, &f1),
-            half * (dot(&r1, &f2) + dot(&r2, &f1)),
-            dot(&r2, &f2),
-        ],
-    })
-}
-
-/// [`ReferenceTriangle::stretch_in_space`] of four triangles side by side.
-#[inline(always)]
-pub fn stretches_in_space(
-    triangles: &[ReferenceTriangle; LANES],
-    [s11, s12, s22]: &[Lanes; 3],
-) -> [Lanes; 6] {
-    let along = vectors(|lane| triangles[lane].along.into());
-    let normal = vectors(|lane| triangles[lane].normal.into());
-    let across = cross(&normal, &along);
-    let plus = |a: &Vectors, s: Lanes, b: &Vectors, t: Lanes| {
-        let axis = |axis: usize| a[axis] * s + b[axis] * t;
-        [axis(0), axis(1), axis(2)]
-    };
-    let u1 = plus(&along, *s11, &across, *s12);
-    let u2 = plus(&along, *s12, &across, *s22);
-    let entry = |i: usize, j: usize| u1[i] * along[j] + u2[i] * across[j] + normal[i] * normal[j];
-    upper_triangle(entry)
-}
-
-/// xx, xy, xz, yy, yz, zz of a symmetric 3 x 3 matrix.
-#[inline(always)]
-fn upper_triangle<T>(entry: impl Fn(usize, usize) -> T) -> [T; 6] {
+pub fn stretch_in_space(
+    along: &Vector3<f64>,
+    normal: &Vector3<f64>,
+    [s11, s12, s22]: [f64; 3],
+) -> [f64; 6] {
+    let (b1, b2, n) = (along, normal.cross(along), normal);
+    let (u1, u2) = (b1 * s11 + b2 * s12, b1 * s12 + b2 * s22);
+    let entry = |i: usize, j: usize| u1[i] * b1[j] + u2[i] * b2[j] + n[i] * n[j];
     [
         entry(0, 0),
         entry(0, 1),
@@ -340,47 +256,6 @@ mod tests {
             prop_assert!(rotation::log(&(turn.inverse() * polar.rotation)).norm() < 1e-10);
             prop_assert!((polar.stretch[0] - 1.0).abs() < 1e-10);
             prop_assert!(polar.stretch[1].abs() < 1e-10);
-        }
-    }
-
-    proptest! {
-        #[test]
-        fn four_at_once_are_as_one_by_one(
-            rest in prop::array::uniform4(prop::array::uniform3(point())),
-            turn in point(),
-            offsets in prop::array::uniform4(prop::array::uniform2(point())),
-        ) {
-            let triangles = rest.map(|rest| ReferenceTriangle::new(rest, 1.0));
-            // turned by less than a right angle or so, and deformed
-            let turn = rotation::exp(&turn);
-            let sides: [[Vector3<f64>; 2]; LANES] = std::array::from_fn(|lane| {
-                let [a, b, c] = rest[lane];
-                let [near, far] = offsets[lane].map(|offset| offset * 0.1);
-                [turn * (b - a) + near, turn * (c - a) + far]
-            });
-            let of = |side: usize| vectors(|lane| sides[lane][side].into());
-            let found = polars(&triangles, &of(0), &of(1));
-            prop_assume!(found.is_some());
-            let found = found.unwrap();
-            let stretches = stretches_in_space(&triangles, &found.stretch);
-            for lane in 0..LANES {
-                let [e1, e2] = sides[lane];
-                let one = triangles[lane].polar(&e1, &e2).unwrap();
-                let matrix = Matrix3::from_fn(|i, j| found.matrix[i][j].0[lane]);
-                // thin triangles enlarge rounding
-                let thin = triangles[lane].height.min(triangles[lane].length);
-                let bound = 1e-13 / (thin * e1.cross(&e2).norm()).min(1.0);
-                let turn = *one.rotation.to_rotation_matrix().matrix();
-                prop_assert!((matrix - turn).norm() < bound);
-                let q = found.quaternion.map(|x| x.0[lane]);
-                let q = UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(q[0], q[1], q[2], q[3]));
-                prop_assert!((q.to_rotation_matrix().matrix() - turn).norm() < 4.0 * bound);
-                let expected = triangles[lane].stretch_in_space(one.stretch);
-                for entry in 0..6 {
-                    let off = (stretches[entry].0[lane] - expected[entry]).abs();
-                    prop_assert!(off < bound * (1.0 + expected[entry].abs()));
-                }
-            }
         }
     }
 

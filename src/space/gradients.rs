@@ -14,7 +14,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use super::orientation::polar_factors;
@@ -22,11 +22,11 @@ use super::placement::{Placement, blocks_from, follow_rotation, triple};
 use super::registry::State;
 use super::scales::{Scales, area_shares};
 use super::{Block, Invariance, ShapeSpace};
-use crate::math::lanes::{LANES, Lanes, times};
-use crate::math::rotation::{exp, log, logs, products, quaternions};
-use crate::mesh::{Poisson, Polar, ReferenceTriangle, stretches_in_space};
+use crate::math::columns::{BLOCK, Column, row, set_row, widely};
+use crate::math::rotation::{exp, log};
+use crate::mesh::{Poisson, Polar, ReferenceTriangle, stretch_in_space};
 
-/// Triangles that one thread takes at a time: small meshes are shared evenly too. A multiple of [`LANES`].
+/// Triangles that one thread takes at a time: small meshes are shared evenly too. A multiple of [`BLOCK`].
 const CHUNK: usize = 512;
 
 /// The space of deformation gradients.
@@ -159,7 +159,7 @@ impl Gradients {
 /// yy, yz, zz of its S, where off-diagonal entries stand for two and are scaled by the root of 2; both
 /// times their weight and the triangle's share.
 pub(super) fn encode_faces(
-    (reference, shares, (rotation, stretch)): (&[ReferenceTriangle], &[f64], (f64, f64)),
+    (reference, shares, weights): (&[ReferenceTriangle], &[f64], (f64, f64)),
     polars: &[Polar],
     back: impl Fn(usize) -> UnitQuaternion<f64> + Sync,
     (rotations, stretches): (&mut [f64], &mut [f64]),
@@ -173,38 +173,78 @@ pub(super) fn encode_faces(
             let faces = first..first + rotations.len() / 3;
             let (reference, polars) = (&reference[faces.clone()], &polars[faces.clone()]);
             let shares = &shares[faces];
-            let fours = reference.as_chunks::<LANES>().0;
-            for (group, four) in fours.iter().enumerate() {
-                let at = LANES * group;
-                let turns = quaternions(|lane| polars[at + lane].rotation);
-                let back = quaternions(|lane| back(first + at + lane));
-                let share = Lanes::of(|lane| shares[at + lane]);
-                let w = logs(&products(&back, &turns));
-                let w = times(&w, Lanes::splat(rotation) * share);
-                interleave(&w, &mut rotations[3 * at..]);
-                let s = [0, 1, 2].map(|entry| Lanes::of(|lane| polars[at + lane].stretch[entry]));
-                let mut s = stretches_in_space(four, &s);
-                for (entry, doubled) in s.iter_mut().zip(OFF_DIAGONAL) {
-                    *entry = *entry * (Lanes::splat(stretch * doubled) * share);
-                }
-                interleave(&s, &mut stretches[6 * at..]);
-            }
-            for at in LANES * fours.len()..reference.len() {
-                let w = log(&(back(first + at) * polars[at].rotation)) * (rotation * shares[at]);
-                rotations[3 * at..3 * at + 3].copy_from_slice(w.as_slice());
-                let s = reference[at].stretch_in_space(polars[at].stretch);
-                for entry in 0..6 {
-                    stretches[6 * at + entry] =
-                        s[entry] * (stretch * OFF_DIAGONAL[entry] * shares[at]);
-                }
-            }
+            let faces = FaceRows {
+                reference,
+                polars,
+                shares,
+                weights,
+            };
+            widely(
+                #[inline(always)]
+                || faces.write(|i| back(first + i), rotations, stretches),
+            );
         });
 }
 
-/// Writes the numbers of four triangles, triangle after triangle.
-fn interleave<const N: usize>(numbers: &[Lanes; N], out: &mut [f64]) {
-    for (lane, out) in out.as_chunks_mut::<N>().0[..LANES].iter_mut().enumerate() {
-        *out = numbers.map(|number| number.0[lane]);
+/// Triangles whose coordinates one thread writes.
+struct FaceRows<'a> {
+    reference: &'a [ReferenceTriangle],
+    polars: &'a [Polar],
+    shares: &'a [f64],
+    weights: (f64, f64),
+}
+
+impl FaceRows<'_> {
+    #[inline(always)]
+    fn write(
+        &self,
+        back: impl Fn(usize) -> UnitQuaternion<f64>,
+        rotations: &mut [f64],
+        stretches: &mut [f64],
+    ) {
+        const NONE: Column = [0.0; BLOCK];
+        let [mut turns, mut backs] = [[NONE; 4]; 2];
+        let [mut along, mut normal, mut plane] = [[NONE; 3]; 3];
+        let mut scales = [NONE; 2];
+        let (mut w, mut s) = ([NONE; 3], [NONE; 6]);
+        for first in (0..self.polars.len()).step_by(BLOCK) {
+            let count = BLOCK.min(self.polars.len() - first);
+            for i in 0..count {
+                let (triangle, polar) = (&self.reference[first + i], &self.polars[first + i]);
+                set_row(&mut turns, i, polar.rotation.coords.into());
+                set_row(&mut backs, i, back(first + i).coords.into());
+                set_row(&mut along, i, triangle.along.into());
+                set_row(&mut normal, i, triangle.normal.into());
+                set_row(&mut plane, i, polar.stretch);
+                let share = self.shares[first + i];
+                set_row(
+                    &mut scales,
+                    i,
+                    [self.weights.0 * share, self.weights.1 * share],
+                );
+            }
+            for i in 0..BLOCK {
+                let turn =
+                    |columns| UnitQuaternion::new_unchecked(Quaternion::from(row(columns, i)));
+                let [rotation, stretch] = row(&scales, i);
+                set_row(
+                    &mut w,
+                    i,
+                    (log(&(turn(&backs) * turn(&turns))) * rotation).into(),
+                );
+                let (b1, n) = (row(&along, i).into(), row(&normal, i).into());
+                let mut six = stretch_in_space(&b1, &n, row(&plane, i));
+                for (entry, doubled) in six.iter_mut().zip(OFF_DIAGONAL) {
+                    *entry *= stretch * doubled;
+                }
+                set_row(&mut s, i, six);
+            }
+            for i in 0..count {
+                let face = first + i;
+                rotations[3 * face..3 * face + 3].copy_from_slice(&row(&w, i));
+                stretches[6 * face..6 * face + 6].copy_from_slice(&row(&s, i));
+            }
+        }
     }
 }
 

@@ -1,14 +1,14 @@
 //! How a shape, and parts of it, are turned against the reference pose.
 
-use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use super::placement::triple;
-use crate::math::lanes::{LANES, Lanes, Vectors, minus, vectors};
+use crate::math::columns::{BLOCK, widely};
 use crate::math::rotation::nearest;
-use crate::mesh::{Polar, ReferenceTriangle, polars};
+use crate::mesh::{Polar, PolarBlock, ReferenceTriangle};
 
-/// Triangles that one thread takes at a time, a multiple of [`LANES`]; sums are taken chunk by chunk in this
+/// Triangles that one thread takes at a time, a multiple of [`BLOCK`]; sums are taken chunk by chunk in this
 /// order.
 const CHUNK: usize = 512;
 
@@ -39,7 +39,10 @@ pub(super) fn polar_factors(
                 sum: Matrix3::zeros(),
                 flat: Vec::new(),
             };
-            part.run(factors);
+            widely(
+                #[inline(always)]
+                || part.run(factors),
+            );
             let flat = part.flat.iter().map(|face| CHUNK * chunk + face);
             (part.sum, flat.collect())
         })
@@ -64,56 +67,30 @@ struct Part<'a> {
 }
 
 impl Part<'_> {
+    #[inline(always)]
     fn run(&mut self, factors: &mut [Polar]) {
-        let mut sums = [[Lanes::splat(0.0); 3]; 3];
-        let fours = self.reference.as_chunks::<LANES>().0;
-        for (group, four) in fours.iter().enumerate() {
-            let first = LANES * group;
-            let out = &mut factors[first..first + LANES];
-            if !self.four(four, first, &mut sums, out) {
-                (0..LANES).for_each(|lane| self.one(first + lane, &mut out[lane]));
+        let mut block = PolarBlock::default();
+        for (at, factors) in factors.chunks_mut(BLOCK).enumerate() {
+            let first = BLOCK * at;
+            for i in 0..factors.len() {
+                let face = first + i;
+                let sides = sides(&self.triangles[face], self.positions);
+                block.set(i, &self.reference[face], sides);
+            }
+            block.factor();
+            for (i, out) in factors.iter_mut().enumerate() {
+                match block.get(i) {
+                    Some((polar, turn)) => {
+                        self.sum += turn * self.reference[first + i].area();
+                        *out = polar;
+                    }
+                    None => self.one(first + i, out),
+                }
             }
         }
-        for face in LANES * fours.len()..factors.len() {
-            self.one(face, &mut factors[face]);
-        }
-        self.sum += Matrix3::from_fn(|i, j| sums[i][j].sum());
     }
 
-    /// Four triangles side by side; false when they need care.
-    fn four(
-        &self,
-        four: &[ReferenceTriangle; LANES],
-        first: usize,
-        sums: &mut [Vectors; 3],
-        out: &mut [Polar],
-    ) -> bool {
-        let corner = |which: usize| {
-            vectors(|lane| {
-                let vertex = 3 * self.triangles[first + lane][which] as usize;
-                [0, 1, 2].map(|axis| self.positions[vertex + axis])
-            })
-        };
-        let (a, b, c) = (corner(0), corner(1), corner(2));
-        let Some(found) = polars(four, &minus(&b, &a), &minus(&c, &a)) else {
-            return false;
-        };
-        let areas = Lanes::of(|lane| four[lane].area());
-        for (sums, row) in sums.iter_mut().zip(&found.matrix) {
-            for (sum, entry) in sums.iter_mut().zip(row) {
-                *sum = *sum + *entry * areas;
-            }
-        }
-        for (lane, out) in out.iter_mut().enumerate() {
-            let [w, x, y, z] = found.quaternion.map(|part| part.0[lane]);
-            *out = Polar {
-                rotation: UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z)),
-                stretch: found.stretch.map(|entry| entry.0[lane]),
-            };
-        }
-        true
-    }
-
+    #[inline(never)]
     fn one(&mut self, face: usize, out: &mut Polar) {
         let triangle = &self.reference[face];
         let [e1, e2] = sides(&self.triangles[face], self.positions);
@@ -131,6 +108,7 @@ impl Part<'_> {
 }
 
 /// From corner 0 to corners 1 and 2.
+#[inline(always)]
 fn sides(triangle: &[u32; 3], positions: &[f64]) -> [Vector3<f64>; 2] {
     let [a, b, c] = triangle.map(|vertex| triple(positions, vertex as usize));
     [b - a, c - a]
