@@ -6,6 +6,7 @@
 //! interpolation put them. J J^T has a 3 x 3 block for each pair of vertices joined by a hinge, the pattern
 //! of the finishing solve, analysed once.
 
+use super::damping::Damping;
 use super::fans::{Fans, NO_HINGE};
 use super::shape::point;
 use super::walk::{Errors, corner_halves};
@@ -28,8 +29,8 @@ const GAIN: f64 = 0.5;
 const NEAR: f64 = 1e-7;
 const SLOW: f64 = 0.75;
 
-/// Damping, in parts of the mean diagonal: at the start and at most.
-const DAMPING: [f64; 2] = [1e-2, 1e4];
+/// Damping, in parts of the mean diagonal: at the start, least and most.
+const DAMPING: [f64; 3] = [1e-2, 1e-12, 1e4];
 
 /// What the iteration did.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -127,23 +128,25 @@ impl Closer {
             after: errors.energy(),
             steps: 0,
         };
-        let (mut damping, mut idle, mut refused) = (DAMPING[0], 0, false);
-        while done.after > enough && done.steps < STEPS && damping <= DAMPING[1] {
-            let step = self.step(&errors, damping, kept);
+        let (mut damping, mut idle) = (Damping::new(DAMPING), 0);
+        while done.after > enough && done.steps < STEPS && !damping.spent() {
             done.steps += 1;
-            let trial = step.map(|step| self.moved(&errors, dihedrals, &step));
-            let found = trial.as_ref().map(|trial| fans.errors(&corners, trial));
-            let energy = found.as_ref().map_or(f64::NAN, Errors::energy);
-            let (Some(trial), Some(found), true) = (trial, found, energy < done.after) else {
-                damping *= 10.0;
-                refused = true;
+            let better = self
+                .step(&errors, damping.value(), kept)
+                .map(|(step, promised)| {
+                    let moved = self.moved(&errors, dihedrals, &step);
+                    (fans.errors(&corners, &moved), moved, promised)
+                })
+                .filter(|(found, ..)| found.energy() < done.after);
+            let Some((found, moved, promised)) = better else {
+                damping.refused();
                 continue;
             };
+            let energy = found.energy();
             let gain = (done.after - energy) / done.after;
-            dihedrals.copy_from_slice(&trial);
+            damping.taken((done.after - energy) / promised);
+            dihedrals.copy_from_slice(&moved);
             (errors, done.after) = (found, energy);
-            damping = (damping * if refused { 1.0 } else { 0.1 }).max(1e-12);
-            refused = false;
             idle = if gain < GAIN { idle + 1 } else { 0 };
             if idle == IDLE || (energy < NEAR && gain < SLOW) {
                 break;
@@ -152,8 +155,14 @@ impl Closer {
         done
     }
 
-    /// (J J^T + mu I)^-1 r, for each fan; none where the factorisation breaks down.
-    fn step(&self, errors: &Errors, damping: f64, kept: &mut Option<Factor>) -> Option<Vec<f64>> {
+    /// y = (J J^T + mu I)^-1 r, for each fan, and by how much the energy would fall if r were linear:
+    /// what would be left of r is mu y. None where the factorisation breaks down.
+    fn step(
+        &self,
+        errors: &Errors,
+        damping: f64,
+        kept: &mut Option<Factor>,
+    ) -> Option<(Vec<f64>, f64)> {
         let mut entries = vec![0.0; self.pattern.analysis().pattern().entries()];
         for turn in &self.turns {
             let columns = turn
@@ -181,7 +190,8 @@ impl Closer {
             .flat_map(|r| [r.x, r.y, r.z])
             .collect();
         kept.as_ref()?.solve(1, &mut side);
-        Some(side)
+        let left: f64 = side.iter().map(|y| shift * y * shift * y).sum();
+        Some((side, errors.energy() - 2.0 * left))
     }
 
     /// The angles after the step -J^T y.

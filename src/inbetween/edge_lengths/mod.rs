@@ -19,6 +19,7 @@
 
 mod both_ways;
 mod closing;
+mod damping;
 mod fans;
 mod finishing;
 mod guard;

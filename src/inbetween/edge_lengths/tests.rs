@@ -394,6 +394,32 @@ fn the_order_of_corners_and_of_triangles_does_not_matter() {
 }
 
 #[test]
+fn a_frame_beside_a_known_one_takes_few_factorisations() {
+    // a ball bent along an arc, as a limb is: its lengths are nearly those of a shape
+    let (topology, pose) = ball(40, 40, 0.1);
+    let bent = |p: &[f64]| {
+        let (sine, cosine) = (0.2 * p[2]).sin_cos();
+        let arm = 5.0 - p[0];
+        [5.0 - arm * cosine, p[1], arm * sine]
+    };
+    let other: Vec<f64> = pose.chunks_exact(3).flat_map(bent).collect();
+    let embedding = Embedding::new(&topology).unwrap();
+    let keys = KeyShapes::new(&embedding, &[&pose, &other]);
+    let mut follower = sequence::Follower::new(&embedding);
+    let mut frame = |t: f64| {
+        let target = keys.blend(&[1.0 - t, t], Blend::Lengths);
+        follower.next(&target).unwrap().report
+    };
+    frame(0.5);
+    for t in [0.51, 0.52, 0.53] {
+        let found = frame(t);
+        assert!(found.edges.max_percent() < 0.01, "{found:?}");
+        // an iteration that follows what cannot be seen takes twenty
+        assert!(found.steps[0] + found.steps[1] <= 8, "{found:?}");
+    }
+}
+
+#[test]
 fn sides_that_make_no_triangle_are_named() {
     let (topology, pose) = icosahedron();
     let embedding = Embedding::new(&topology).unwrap();
