@@ -15,7 +15,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use nalgebra::UnitQuaternion;
+use nalgebra::{UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use super::gradients::{decode_stretch, encode_faces};
@@ -41,6 +41,8 @@ pub struct PatchLri {
     rotation: f64,
     stretch: f64,
     placement: Placement,
+    /// Triangles that are torn between shapes, rising; see [`PatchLri::tearing`].
+    torn: Vec<u32>,
     pool: Mutex<Vec<Vec<Polar>>>,
 }
 
@@ -58,8 +60,26 @@ impl PatchLri {
             patching,
             poisson,
             reference,
+            torn: Vec::new(),
             pool: Mutex::default(),
         }
+    }
+
+    /// The space in which the triangles that count less than 1 by `weights`, one a triangle, are torn: how
+    /// they turn says nothing, but they hold together what they lie between. They have no rotation of their
+    /// own; in place of the scale/shear stand the images of both directions of their plane beside the
+    /// patch's rotation, so between shapes their sides change along straight lines.
+    pub(super) fn tearing(mut self, weights: &[f64]) -> Self {
+        let torn = (0u32..).zip(weights).filter(|(_, weight)| **weight < 1.0);
+        self.torn = torn.map(|(face, _)| face).collect();
+        self
+    }
+
+    /// Where the sides of a triangle lead in a shape, beside the sides in the reference.
+    fn images(&self, face: usize, positions: &[f64]) -> [Vector3<f64>; 2] {
+        let corners = self.poisson.analysis().triangles()[face];
+        let [a, b, c] = corners.map(|vertex| triple(positions, vertex as usize));
+        self.poisson.reference()[face].images(&(b - a), &(c - a))
     }
 
     fn faces(&self) -> usize {
@@ -107,6 +127,18 @@ impl PatchLri {
             |face| back[patch[face] as usize],
             (rotations, stretches),
         );
+        for face in self.torn.iter().map(|&face| face as usize) {
+            rotations[3 * face..3 * face + 3].fill(0.0);
+            let scale = self.stretch * self.shares[face];
+            let images = self.images(face, positions);
+            for (out, image) in stretches[6 * face..6 * face + 6]
+                .chunks_exact_mut(3)
+                .zip(images)
+            {
+                let image = back[patch[face] as usize] * image * scale;
+                out.copy_from_slice(image.as_slice());
+            }
+        }
         let patching = &self.patching;
         let links = patching.links().iter().zip(patching.pair_shares());
         for (out, (&[i, j], share)) in pairs.chunks_exact_mut(3).zip(links) {
@@ -223,6 +255,10 @@ impl ShapeSpace for PatchLri {
                 let w = triple(coordinates, face) / (self.rotation * self.shares[face]);
                 let stretch = &coordinates[stretches + 6 * face..][..6];
                 let scale = 1.0 / (self.stretch * self.shares[face]);
+                if self.torn.binary_search(&(face as u32)).is_ok() {
+                    let turn = turns[patch[face] as usize];
+                    return [0, 1].map(|side| turn * (triple(stretch, side) * scale));
+                }
                 let turn = (turns[patch[face] as usize] * exp(&w)).to_rotation_matrix();
                 decode_stretch(&reference[face], stretch, scale).map(|image| turn * image)
             },

@@ -391,11 +391,8 @@ impl Spaces {
         let patch = patching::grow((&rest, triangles, weights), &hinges, poses, sought);
         let patching = Patching::new(&rest, weights, &hinges, patch)?;
         let poisson = Poisson::weighted(self.analysis()?, rest, weights.to_vec())?;
-        Ok(Arc::new(PatchLri::new(
-            Arc::new(poisson),
-            self.reference(),
-            patching,
-        )))
+        let space = PatchLri::new(Arc::new(poisson), self.reference(), patching);
+        Ok(Arc::new(space.tearing(weights)))
     }
 
     /// `patch-lri` of a coarse mesh that stands for `fine`: patches, and how they turn against each other,
@@ -422,7 +419,7 @@ impl Spaces {
         };
         let triangles = self.topology.triangles().len();
         let (fine, patching) = FinePatches::grown(fine, triangles, &hinges)?;
-        let space = PatchLri::new(poisson, self.reference(), patching);
+        let space = PatchLri::new(poisson, self.reference(), patching).tearing(weights);
         Ok(CoarsePatchLri::new(space, fine))
     }
 }

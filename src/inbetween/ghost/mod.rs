@@ -18,6 +18,7 @@ mod gradients;
 mod residual;
 mod turns;
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
@@ -172,7 +173,7 @@ impl Ghost {
         let walk = Walk::new(&found.triangles, shapes[0]);
         Ok(Ghost {
             faces: walk.to_faces(triangles, poses[0], &found.absorber),
-            torn: torn(&found.triangles, &shapes),
+            torn: torn_of_ghost(&found, &shapes, (triangles, torn_of_mesh)),
             torn_of_mesh: torn_of_mesh.to_vec(),
             topology: Arc::new(topology),
             vertices: found.vertices,
@@ -361,5 +362,39 @@ impl Following {
                 place[axis] += off[axis];
             }
         }
+    }
+}
+/// By what a ghost's triangles count: as they are torn between its `shapes`, and as those of the mesh are that
+/// they are left of. Beside the longer sides of a ghost a tear is less, but it is where it was.
+fn torn_of_ghost(
+    found: &Collapsed,
+    shapes: &[&[f64]],
+    (triangles, torn_of_mesh): (&[[u32; 3]], &[f64]),
+) -> Vec<f64> {
+    let mut weights = torn(&found.triangles, shapes);
+    if torn_of_mesh.is_empty() {
+        return weights;
+    }
+    let sorted = |mut corners: [u32; 3]| {
+        corners.sort_unstable();
+        corners
+    };
+    let mut left: HashMap<[u32; 3], f64> = HashMap::new();
+    for (triangle, &weight) in triangles.iter().zip(torn_of_mesh) {
+        if weight < 1.0 {
+            let corners = triangle.map(|vertex| found.absorber[vertex as usize]);
+            let least = left.entry(sorted(corners)).or_insert(1.0);
+            *least = least.min(weight);
+        }
+    }
+    weights.resize(found.triangles.len(), 1.0);
+    for (weight, &triangle) in weights.iter_mut().zip(&found.triangles) {
+        if let Some(&of_mesh) = left.get(&sorted(triangle)) {
+            *weight = weight.min(of_mesh);
+        }
+    }
+    match weights.iter().all(|weight| *weight == 1.0) {
+        true => Vec::new(),
+        false => weights,
     }
 }

@@ -120,3 +120,57 @@ fn triangles_that_stand_for_nothing_and_torn_ones_are_like_their_neighbours() {
     let members = listed(2, vec![(0, 0, 1.0), (0, 2, 0.2), (1, 2, 0.3)]);
     assert_eq!(largest_shares(&members, 4, &hinges), [0, 0, 1, 1]);
 }
+
+#[test]
+fn what_is_torn_holds_its_sides_together_on_straight_ways() {
+    // Two plates side by side along x that do not turn; of the row between them every triangle is torn.
+    const LONG: u32 = 12;
+    let (at, wide) = (|i: u32, j: u32| i * (LONG + 1) + j, 9_u32);
+    let cells = (0..wide).flat_map(|i| (0..LONG).map(move |j| (i, j)));
+    let triangles: Vec<[u32; 3]> = cells
+        .flat_map(|(i, j)| {
+            let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            [[a, b, c], [a, c, d]]
+        })
+        .collect();
+    // the upper plate lies across a narrow gap, then on the far side of the lower one and a little off
+    let shape = |shift: [f64; 3]| -> Vec<f64> {
+        let points = (0..=wide).flat_map(|i| (0..=LONG).map(move |j| (i, j)));
+        points
+            .flat_map(|(i, j)| {
+                let plate = if 2 * i > wide { 1.0 } else { 0.0 };
+                let y = f64::from(i) - plate;
+                [
+                    f64::from(j) + plate * shift[0],
+                    y + plate * shift[1],
+                    plate * shift[2],
+                ]
+            })
+            .collect()
+    };
+    let (near, far) = (shape([0.0, 0.05, 0.0]), shape([3.0, -12.0, 0.5]));
+    let weights = crate::mesh::torn(&triangles, &[&near, &far]);
+    let torn = |face: &usize| weights[*face] < 1.0;
+    let row = 2 * (LONG * (wide / 2)) as usize..2 * (LONG * (wide / 2 + 1)) as usize;
+    assert!((0..triangles.len()).filter(torn).eq(row));
+    let topology = Topology::from_triangles(near.len() / 3, &triangles).unwrap();
+    let spaces = Spaces::new(Arc::new(topology), &near);
+    let space = spaces.open_weighted(&[&near, &far], &weights).unwrap();
+    let (mut from, mut to) = (vec![0.0; space.dimension()], vec![0.0; space.dimension()]);
+    space.encode(&near, &mut from);
+    space.encode(&far, &mut to);
+    space.follow(&from, &mut to);
+    for share in [0.0, 0.3, 0.5, 1.0] {
+        let blended: Vec<f64> = from
+            .iter()
+            .zip(&to)
+            .map(|(a, b)| a + share * (b - a))
+            .collect();
+        let mut found = vec![0.0; near.len()];
+        space.decode(&blended, &mut found);
+        // torn triangles have a small say in how patches turn
+        for ((found, a), b) in found.iter().zip(&near).zip(&far) {
+            assert!((found - (a + share * (b - a))).abs() < 1e-3, "{share}");
+        }
+    }
+}
