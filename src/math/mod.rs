@@ -2,6 +2,7 @@
 
 pub mod b_spline;
 pub mod banded;
+pub mod banded_cholesky;
 pub mod block_sparse;
 pub mod columns;
 pub mod cubic_spline;

@@ -114,6 +114,14 @@ impl PoseSignal {
         self.plate.jacobian(p, rows);
     }
 
+    /// Writes g(`p`), m numbers, and its derivatives along both axes, two rows of m, at once.
+    ///
+    /// # Panics
+    /// `x` is not m long, or `rows` not 2m.
+    pub fn evaluate_with_jacobian(&self, p: Point, x: &mut [f64], rows: &mut [f64]) {
+        self.plate.evaluate_with_jacobian(p, x, rows);
+    }
+
     /// Writes the second derivatives of g at `p` (11, 12, 22), three rows of m; off the sites.
     ///
     /// # Panics
