@@ -14,6 +14,7 @@ use meshloom::mesh::FrameSource;
 use meshloom::pipeline::plot::plot_loom;
 use meshloom::plot::{Anchor, PoseSpace, Scene, Theme, pose_space};
 
+use meshloom::task::Task;
 use support::{Figure, View, percent, table};
 
 /// How many frames the loop may have: about as many as the paper's adds.
@@ -37,7 +38,7 @@ fn draw(figure: &mut Figure) -> Result<()> {
         scaled(19).min(n - 1),
     ];
     let loom = support::fit_with(&sequence, counts, FitOptions::default())?;
-    let looped = find_loop(&loom, *LENGTHS.start(), *LENGTHS.end())?;
+    let looped = find_loop(&loom, *LENGTHS.start(), *LENGTHS.end(), &Task::default())?;
     let (from, to) = looped.stretch;
     let length = (to - from) as usize;
     let longer = &looped.loom;

@@ -136,7 +136,9 @@ fn frames_outside_of_a_changed_support_keep_their_bits() {
             }
         }
         assert!(untouched > 0 && untouched < n, "{name}: {untouched}");
-        let longer = extend(loom, 7).expect("few frames").output;
+        let longer = extend(loom, 7, &Task::default())
+            .expect("few frames")
+            .output;
         // around a loop that closes the two spans at the seam change
         let kept = |frame: &usize| spans[frame - 1] + 2 < spans[n - 1];
         (1..=n)
@@ -307,7 +309,7 @@ fn loops(frames: usize) -> Vec<(usize, usize)> {
 
 /// The loop, whose seam does not show, and whose frames more than two spans from it keep their bits.
 fn looped_without_a_seam(name: &str, loom: &Loom, (from, to): (usize, usize)) {
-    let looped = add_loop(loom, from as f64, to as f64, 1, None).expect("within");
+    let looped = add_loop(loom, from as f64, to as f64, 1, None, &Task::default()).expect("within");
     let (bridge, seam) = (looped.bridge, looped.seam);
     assert!(
         seam.worst() <= SHOWS,
@@ -377,7 +379,8 @@ fn loops_show_no_seam() {
 fn a_seam_that_shows_is_told_with_its_number() {
     for (name, loom) in looms() {
         for (from, to) in loops(loom.frames()) {
-            let looped = add_loop(loom, from as f64, to as f64, 1, None).expect("within");
+            let looped =
+                add_loop(loom, from as f64, to as f64, 1, None, &Task::default()).expect("within");
             only_the_seam_changes(name, loom, &looped, (from, to));
             let worst = looped.seam.worst();
             let told = Warned::from(looped).warnings;
@@ -422,9 +425,9 @@ fn edits_follow_each_other() {
         Edit::Exaggerate { amount: 1.2 },
     ];
     for (name, loom) in looms() {
-        let last = edits
-            .iter()
-            .try_fold(loom.clone(), |loom, edit| Ok(edit.apply(&loom)?.output));
+        let last = edits.iter().try_fold(loom.clone(), |loom, edit| {
+            Ok(edit.apply(&loom, &Task::default())?.output)
+        });
         let last: Loom = last
             .map_err(|e: Box<Diagnostic>| e.to_string())
             .expect("edits apply");
@@ -440,7 +443,9 @@ fn edits_follow_each_other() {
 fn a_looped_walk_travels_on_without_a_step() {
     let (_, walk) = &looms()[1];
     let (from, to) = (12.0, 45.0);
-    let looped = add_loop(walk, from, to, 2, None).expect("within").loom;
+    let looped = add_loop(walk, from, to, 2, None, &Task::default())
+        .expect("within")
+        .loom;
     let place = |loom: &Loom, frame: usize| {
         let root = loom.root_at(frame as f64).expect("within");
         root.translation.vector
@@ -543,7 +548,7 @@ fn a_transfer_after_a_loop_keeps_the_loop() {
         return;
     };
     let loom = fitted(&gallop, FitOptions::default());
-    let looped = add_loop(&loom, 10.0, 34.0, 2, None).expect("within");
+    let looped = add_loop(&loom, 10.0, 34.0, 2, None, &Task::default()).expect("within");
     let pairs = Examples::new(sources, targets).expect("they pair up");
     let there = |loom: &Loom| {
         let found = transfer(loom, &pairs, &Task::default());

@@ -197,7 +197,7 @@ fn time_stays_and_an_edit_before_or_after_is_the_same() {
         assert_eq!(found.topology().vertices(), target.vertices());
         assert_eq!(found.fps(), Some(24.0));
         for edit in &edits {
-            let edited = |loom: &Loom| edit.apply(loom).unwrap().output;
+            let edited = |loom: &Loom| edit.apply(loom, &Task::default()).unwrap().output;
             let (before, after) = (on_target(&edited(&loom)), edited(&found));
             assert_eq!(before.frames(), after.frames(), "{edit:?}");
             for frame in 1..=before.frames() {

@@ -1,11 +1,11 @@
 //! The way over a seam: control points that let the shapes change as evenly as the motion itself does.
 
-use faer::Mat;
-
 use super::seam::Clip;
+use crate::diag::Result;
 use crate::math::b_spline::{Curve, Place, Point, basis};
-use crate::math::symmetric::inverse;
+use crate::math::banded_cholesky::BandedSymmetric;
 use crate::signal::pose::PoseSignal;
+use crate::task::Task;
 
 /// Steps of the solver for each power; it stops earlier when a step gains less than a thousandth.
 const STEPS: usize = 40;
@@ -17,10 +17,14 @@ const POWERS: [i32; 4] = [2, 4, 8, 16];
 /// A way that shows this much of the motion's own changes at most is not bettered.
 const ENOUGH: f64 = 1.25;
 
+/// Of the ways with the least squares so many are followed on, the least first.
+const FOLLOWED: usize = 2;
+
 /// Steps and second differences of shapes at consecutive places, of which a few control points are to be
 /// moved.
 pub(super) struct Way<'a> {
     pose: &'a PoseSignal,
+    task: &'a Task,
     /// Span and weights of the four control points of each place.
     places: Vec<(Place, [f64; 4])>,
     terms: Vec<Term>,
@@ -32,18 +36,55 @@ pub(super) struct Way<'a> {
 struct Term {
     /// Its first place.
     at: usize,
-    /// Factors of the shapes there and at the next ones; 0 beyond a step.
-    factors: [f64; 3],
+    /// What kind it is of.
+    kind: &'static Kind,
+    /// What its factors are in units of the motion.
+    unit: f64,
     /// What it is in the motion as it was, where its places followed each other there.
     own: Vec<f64>,
 }
 
+/// A kind of difference: of places a stride apart.
+struct Kind {
+    stride: usize,
+    factors: &'static [f64],
+}
+
+/// Steps from half frame to half frame, as those of whole ones.
+const STEP: Kind = Kind {
+    stride: 1,
+    factors: &[-2.0, 2.0],
+};
+
+/// Second differences over whole frames, at half frames too: over half ones a sharp turn, as that of the shapes
+/// at a site, would count twice.
+const BEND: Kind = Kind {
+    stride: 2,
+    factors: &[1.0, -2.0, 1.0],
+};
+
+/// Places that meet in a term lie less than this apart.
+const APART: usize = 5;
+
+impl Term {
+    /// Its places and their factors.
+    fn parts(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let factors = self.kind.factors.iter().enumerate();
+        factors.map(|(k, factor)| (self.at + k * self.kind.stride, factor * self.unit))
+    }
+
+    /// Whether it is a second difference at half frames.
+    fn halves(&self) -> bool {
+        self.kind.stride == BEND.stride && self.at % 2 == 1
+    }
+}
+
 impl<'a> Way<'a> {
-    /// The way over `places` of `curve`, two for each frame, whose control points from `first` on, `count`
+    /// The way over `places` of `curve`, two for each frame (at even numbers the frame itself), whose control points from `first` on, `count`
     /// of them, are free. `source` gives where the motion was at each place before, and on which side of
-    /// the seam; none where the place is new.
+    /// the seam; none where the place is new. Cancelling `task` ends the search.
     pub(super) fn new(
-        (pose, clip): (&'a PoseSignal, &Clip),
+        (pose, clip, task): (&'a PoseSignal, &Clip, &'a Task),
         curve: &Curve,
         places: &[Place],
         source: &[Option<(bool, Point)>],
@@ -58,19 +99,33 @@ impl<'a> Way<'a> {
             .iter()
             .map(|known| known.map(|(side, p)| (side, shape(p))))
             .collect();
-        // Over half frames steps are halves and second differences quarters.
-        let per = |motion: f64, part: f64| if motion > 0.0 { part / motion } else { 0.0 };
-        let (step, bend) = (per(clip.step(), 2.0), per(clip.bend(), 4.0));
+        let per = |motion: f64| if motion > 0.0 { 1.0 / motion } else { 0.0 };
+        let kinds = [(&STEP, per(clip.step())), (&BEND, per(clip.bend()))];
         let mut terms = Vec::new();
-        for (factors, length) in [([-step, step, 0.0], 2), ([bend, -2.0 * bend, bend], 3)] {
-            for (at, known) in source.windows(length).enumerate() {
-                let own = own(known, &factors).unwrap_or_else(|| vec![0.0; pose.modes()]);
-                terms.push(Term { at, factors, own });
+        for (kind, unit) in kinds {
+            let over = kind.stride * (kind.factors.len() - 1);
+            for at in 0..source.len().saturating_sub(over) {
+                let own = vec![0.0; pose.modes()];
+                let mut term = Term {
+                    at,
+                    kind,
+                    unit,
+                    own,
+                };
+                // Beside the bridge half of what the motion does at a frame lies between frames.
+                if term.halves() && term.parts().any(|(at, _)| source[at].is_some()) {
+                    continue;
+                }
+                if let Some(own) = own_of(&source, &term) {
+                    term.own = own;
+                }
+                terms.push(term);
             }
         }
         let weighed = |&place: &Place| (place, basis(curve.around(place.span), place.offset));
         Way {
             pose,
+            task,
             places: places.iter().map(weighed).collect(),
             terms,
             first,
@@ -78,64 +133,78 @@ impl<'a> Way<'a> {
         }
     }
 
-    /// The curve with its free control points where the largest of what shows is about least; it is never
-    /// larger than on the curve given.
-    pub(super) fn evened(&self, curve: &Curve) -> Curve {
-        let mut best = State::new(self, curve.clone());
-        for power in POWERS {
-            if power > POWERS[0] && best.largest() <= ENOUGH {
-                break;
-            }
-            let next = self.descend(&best, power);
-            // The first power may trade a larger peak for less in all.
-            if power == POWERS[0] || next.largest() < best.largest() {
-                best = next;
-            }
-        }
-        match best.largest() < State::new(self, curve.clone()).largest() {
-            true => best.curve,
-            false => curve.clone(),
-        }
-    }
-
-    /// Of the curves that the `starts` lead to the one where the largest of what shows is least, or the
-    /// first that is good enough.
-    pub(super) fn best(&self, starts: &[Curve]) -> Option<Curve> {
+    /// Of the curves that the `starts` lead to the one where the largest of what shows is about least, or
+    /// the first that is good enough; it is never larger than on any of the starts. None without starts.
+    ///
+    /// # Errors
+    /// The task was cancelled.
+    pub(super) fn best(&self, starts: &[Curve]) -> Result<Option<Curve>> {
         let mut best: Option<(f64, Curve)> = None;
-        for start in starts {
-            let curve = self.evened(start);
-            let shown = State::new(self, curve.clone()).largest();
+        let mut keep = |state: &State| {
+            let shown = state.largest();
             if best.as_ref().is_none_or(|(least, _)| shown < *least) {
-                best = Some((shown, curve));
+                best = Some((shown, state.curve.clone()));
             }
-            if shown <= ENOUGH {
+            shown
+        };
+        let mut ways = Vec::new();
+        for start in starts {
+            let start = State::new(self, start.clone());
+            keep(&start);
+            let squares = self.descend(start, POWERS[0])?;
+            keep(&squares);
+            ways.push((squares.energy(POWERS[0], 1.0), squares));
+        }
+        ways.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // Starts that lead to the same way lead on to the same.
+        ways.dedup_by(|b, a| b.0 - a.0 <= 1e-3 * a.0);
+        for (_, way) in ways.into_iter().take(FOLLOWED) {
+            let mut way = way;
+            for power in &POWERS[1..] {
+                if way.largest() <= ENOUGH {
+                    break;
+                }
+                way = self.descend(way, *power)?;
+                keep(&way);
+            }
+            if way.largest() <= ENOUGH {
                 break;
             }
         }
-        best.map(|(_, curve)| curve)
+        Ok(best.map(|(_, curve)| curve))
     }
 
-    /// The curve with its free control points laid evenly along a way of points.
-    pub(super) fn laid(&self, curve: &Curve, way: &[Point]) -> Curve {
+    /// The curve with `count` of its free control points, beginning with number `from` of them, laid evenly
+    /// along a way of points.
+    pub(super) fn laid(
+        &self,
+        curve: &Curve,
+        (from, count): (usize, usize),
+        way: &[Point],
+    ) -> Curve {
         let parts = (way.len().max(2) - 1) as f64;
-        (0..self.count).fold(curve.clone(), |curve, j| {
-            let along = parts * (j + 1) as f64 / (self.count + 1) as f64;
-            let (from, part) = (along.floor() as usize, along.fract());
+        (0..count).fold(curve.clone(), |curve, j| {
+            let along = parts * (j + 1) as f64 / (count + 1) as f64;
+            let (piece, part) = (along.floor() as usize, along.fract());
             let at = |i: usize| way.get(i).or(way.last()).copied().unwrap_or_default();
-            let (a, b) = (at(from), at(from + 1));
-            curve.with_control(self.first + j, [0, 1].map(|k| a[k] + part * (b[k] - a[k])))
+            let (a, b) = (at(piece), at(piece + 1));
+            let to = [0, 1].map(|k| a[k] + part * (b[k] - a[k]));
+            curve.with_control(self.first + from + j, to)
         })
     }
 
-    /// Levenberg-Marquardt with analytic derivatives on the sum of a power of what shows.
-    fn descend(&self, start: &State, power: i32) -> State {
+    /// Newton's method on the sum of a power of what shows, the curvature of the shapes left out, damped
+    /// as by Levenberg and Marquardt.
+    fn descend(&self, start: State, power: i32) -> Result<State> {
         let top = start.largest();
-        let mut best = start.clone();
+        let mut best = start;
         if top == 0.0 {
-            return best;
+            return Ok(best);
         }
-        let mut damping = 1e-3;
+        let mut damping = 1e-4;
+        let mut before = best.energy(power, top);
         for _ in 0..STEPS {
+            self.task.check()?;
             let Some(step) = self.step(&best, (power, top), damping) else {
                 break;
             };
@@ -145,83 +214,118 @@ impl<'a> Way<'a> {
                 curve.with_control(self.first + j, to)
             });
             let next = State::new(self, curve);
-            let (before, after) = (best.energy(power, top), next.energy(power, top));
+            let after = next.energy(power, top);
             if after < before {
+                let gained = before - after;
                 best = next;
                 damping = (0.2 * damping).max(1e-9);
-                if after > (1.0 - 1e-3) * before {
+                if gained < 1e-3 * before {
                     break;
                 }
+                before = after;
             } else {
-                damping *= 5.0;
+                damping *= 8.0;
                 if damping > 1e6 {
                     break;
                 }
             }
         }
-        best
+        Ok(best)
     }
 
-    /// The damped Gauss-Newton step of the free control points, x and y of each.
+    /// The damped step of the free control points, x and y of each.
+    ///
+    /// Of |r|^p, r being what is left of a term and u its direction, the gradient is p |r|^(p-1) J^T u and
+    /// the Hessian p |r|^(p-2) (J^T J + (p-2) J^T u u^T J), J linear. Both are gathered for the places
+    /// first, each of which meets the next few only, and go to the control points by the weights.
     fn step(&self, state: &State, (power, top): (i32, f64), damping: f64) -> Option<Vec<f64>> {
-        let n = 2 * self.count;
-        let slopes = self.slopes(&state.curve);
-        let (mut matrix, mut right) = (Mat::<f64>::zeros(n, n), vec![0.0; n]);
+        let m = self.pose.modes();
+        let mut pulls = vec![[0.0; 2]; self.places.len()];
+        let mut pairs = vec![[Pair::default(); APART]; self.places.len()];
         for (term, (rest, size)) in self.terms.iter().zip(state.rests(self)) {
+            if size == 0.0 {
+                continue;
+            }
             let weight = (size / top).powi(power - 2);
-            let involved = |k: usize| Some((term.factors[k], slopes.get(term.at + k)?.as_ref()?));
-            for (p, (f, a)) in (0..3).filter_map(|k| Some((k, involved(k)?))) {
-                self.each(term.at + p, |c, w| {
-                    for axis in 0..2 {
-                        right[2 * c + axis] -= weight * f * w * dot(a.along(axis), rest);
+            let stiff = f64::from(power - 2) * weight;
+            let along = |(place, factor): (usize, f64)| {
+                let rows = state.slopes(place, m);
+                rows.map(|row| factor * dot(row, rest) / size)
+            };
+            let parts: Vec<_> = term.parts().map(|part| (part, along(part))).collect();
+            for (k, ((place, factor), slope)) in parts.iter().enumerate() {
+                (0..2).for_each(|axis| pulls[*place][axis] -= weight * size * slope[axis]);
+                for ((next, other), slope_there) in &parts[k..] {
+                    let pair = &mut pairs[*place][next - place];
+                    pair.common += weight * factor * other;
+                    for (i, entry) in pair.entries.iter_mut().enumerate() {
+                        *entry += stiff * slope[i / 2] * slope_there[i % 2];
                     }
-                });
-                for (q, (g, b)) in (0..3).filter_map(|k| Some((k, involved(k)?))) {
-                    let products = a.times(b);
-                    self.each(term.at + p, |c, w| {
-                        self.each(term.at + q, |d, z| {
-                            for (i, product) in products.iter().enumerate() {
-                                matrix[(2 * c + i / 2, 2 * d + i % 2)] +=
-                                    weight * f * g * w * z * product;
-                            }
-                        });
-                    });
                 }
             }
         }
-        for j in 0..n {
-            // relative to each unknown's own column; one that nothing depends on stays
-            matrix[(j, j)] += damping * matrix[(j, j)] + f64::MIN_POSITIVE;
-        }
-        let inverse = inverse(matrix)?;
-        let row = |i: usize| (0..n).map(|j| inverse[(i, j)] * right[j]).sum();
-        Some((0..n).map(row).collect())
-    }
-
-    /// Calls for each free control point that place `i` depends on, with its weight.
-    fn each(&self, i: usize, mut call: impl FnMut(usize, f64)) {
-        let (place, weights) = &self.places[i];
-        for (c, weight) in weights.iter().enumerate() {
-            let free = (place.span + c).checked_sub(self.first);
-            if let Some(j) = free.filter(|&j| j < self.count) {
-                call(j, *weight);
+        let mut matrix = BandedSymmetric::new(2 * self.count, 2 * self.reach());
+        let mut right = vec![0.0; 2 * self.count];
+        for (place, pull) in pulls.iter().enumerate() {
+            for (c, w) in self.free(place) {
+                (0..2).for_each(|axis| right[2 * c + axis] += w * pull[axis]);
+            }
+            for (apart, pair) in pairs[place].iter().enumerate() {
+                if pair.common == 0.0 || self.free(place).next().is_none() {
+                    continue;
+                }
+                let (a, b) = (state.slopes(place, m), state.slopes(place + apart, m));
+                for (i, entry) in pair.entries.iter().enumerate() {
+                    let value = entry + pair.common * dot(a[i / 2], b[i % 2]);
+                    for (c, w) in self.free(place) {
+                        for (d, z) in self.free(place + apart) {
+                            let (row, column) = (2 * c + i / 2, 2 * d + i % 2);
+                            let value = w * z * value;
+                            // a pair of two places stands for both its orders
+                            match (apart, row.cmp(&column)) {
+                                (0, std::cmp::Ordering::Greater) => {}
+                                (0, _) => matrix.add(row, column, value),
+                                (_, std::cmp::Ordering::Equal) => matrix.add(row, row, 2.0 * value),
+                                _ => matrix.add(row.min(column), row.max(column), value),
+                            }
+                        }
+                    }
+                }
             }
         }
+        for j in 0..2 * self.count {
+            // relative to each unknown's own column; one that nothing depends on stays
+            matrix.add(j, j, damping * matrix.diagonal(j) + f64::MIN_POSITIVE);
+        }
+        matrix.solve(&right)
     }
 
-    /// The derivatives of the shape at each place that depends on a free control point.
-    fn slopes(&self, curve: &Curve) -> Vec<Option<Slopes>> {
-        let free =
-            |place: &Place| place.span + 3 >= self.first && place.span < self.first + self.count;
-        let slopes = |(place, _): &(Place, [f64; 4])| {
-            free(place).then(|| {
-                let mut rows = vec![0.0; 2 * self.pose.modes()];
-                self.pose.jacobian(curve.at(*place), &mut rows);
-                Slopes(rows)
+    /// The free control points that a place depends on, with its weights; none beyond the last place.
+    fn free(&self, place: usize) -> impl Iterator<Item = (usize, f64)> {
+        let known = self.places.get(place);
+        let (first, count) = (self.first, self.count);
+        known.into_iter().flat_map(move |(place, weights)| {
+            weights.iter().enumerate().filter_map(move |(c, weight)| {
+                let free = (place.span + c).checked_sub(first)?;
+                (free < count).then_some((free, *weight))
             })
-        };
-        self.places.iter().map(slopes).collect()
+        })
     }
+
+    /// So many control points in a row meet in a term.
+    fn reach(&self) -> usize {
+        let spans = self.places.windows(APART);
+        let spans = spans.map(|p| p[APART - 1].0.span - p[0].0.span);
+        4 + spans.max().unwrap_or(0)
+    }
+}
+
+/// What two places have to do with each other: a factor of the product of their derivatives, and what is
+/// added to it, row after row.
+#[derive(Clone, Copy, Default)]
+struct Pair {
+    common: f64,
+    entries: [f64; 4],
 }
 
 /// Frames (from 0) of the motion that lead from one to another, both among them, in steps whose squares
@@ -257,12 +361,12 @@ pub(super) fn through(clip: &Clip, from: usize, to: usize) -> Vec<usize> {
     way
 }
 
-/// The difference in the motion as it was, where all shapes are known on one side of the seam.
-fn own(known: &[Option<(bool, Vec<f64>)>], factors: &[f64; 3]) -> Option<Vec<f64>> {
-    let side = known[0].as_ref()?.0;
-    let mut sum = vec![0.0; known[0].as_ref()?.1.len()];
-    for (shape, factor) in known.iter().zip(factors) {
-        let (_, x) = shape.as_ref().filter(|(own, _)| *own == side)?;
+/// The difference in the motion as it was, where all its shapes are known on one side of the seam.
+fn own_of(source: &[Option<(bool, Vec<f64>)>], term: &Term) -> Option<Vec<f64>> {
+    let side = source[term.at].as_ref()?.0;
+    let mut sum = vec![0.0; term.own.len()];
+    for (place, factor) in term.parts() {
+        let (_, x) = source[place].as_ref().filter(|(own, _)| *own == side)?;
         sum.iter_mut()
             .zip(x)
             .for_each(|(sum, x)| *sum += factor * x);
@@ -270,29 +374,16 @@ fn own(known: &[Option<(bool, Vec<f64>)>], factors: &[f64; 3]) -> Option<Vec<f64
     Some(sum)
 }
 
-/// The derivatives of a shape along both axes of the map, one row after the other.
-struct Slopes(Vec<f64>);
-
-impl Slopes {
-    fn along(&self, axis: usize) -> &[f64] {
-        let m = self.0.len() / 2;
-        &self.0[axis * m..(axis + 1) * m]
-    }
-
-    /// Products of the rows: 00, 01, 10, 11.
-    fn times(&self, other: &Slopes) -> [f64; 4] {
-        [0, 1, 2, 3].map(|i| dot(self.along(i / 2), other.along(i % 2)))
-    }
-}
-
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// A curve, and for each term what is left of it beside the motion's own, and its norm.
+/// A curve, the derivatives of the shape along both axes of the map at each place (two rows of m), and for
+/// each term what is left of it beside the motion's own, and its norm.
 #[derive(Clone)]
 struct State {
     curve: Curve,
+    slopes: Vec<f64>,
     rests: Vec<f64>,
     sizes: Vec<f64>,
 }
@@ -301,23 +392,36 @@ impl State {
     fn new(way: &Way<'_>, curve: Curve) -> Self {
         let m = way.pose.modes();
         let mut x = vec![0.0; m * way.places.len()];
-        for ((place, _), x) in way.places.iter().zip(x.chunks_mut(m.max(1))) {
-            way.pose.evaluate(curve.at(*place), x);
+        let mut slopes = vec![0.0; 2 * x.len()];
+        let rows = x.chunks_mut(m.max(1)).zip(slopes.chunks_mut(2 * m.max(1)));
+        for ((place, _), (x, slopes)) in way.places.iter().zip(rows) {
+            way.pose.evaluate_with_jacobian(curve.at(*place), x, slopes);
         }
         let mut rests = Vec::with_capacity(m * way.terms.len());
         for term in &way.terms {
-            rests.extend((0..m).map(|j| {
-                let at = |k: usize| x.get((term.at + k) * m + j).copied().unwrap_or(0.0);
-                let [f, g, h] = term.factors;
-                f * at(0) + g * at(1) + h * at(2) - term.own[j]
-            }));
+            let from = rests.len();
+            rests.extend(term.own.iter().map(|own| -own));
+            for (place, factor) in term.parts() {
+                let shape = &x[place * m..][..m];
+                rests[from..]
+                    .iter_mut()
+                    .zip(shape)
+                    .for_each(|(rest, x)| *rest += factor * x);
+            }
         }
         let sizes = rests.chunks(m.max(1)).map(|rest| dot(rest, rest).sqrt());
         State {
             sizes: sizes.collect(),
             curve,
+            slopes,
             rests,
         }
+    }
+
+    /// The derivatives at a place.
+    fn slopes(&self, place: usize, m: usize) -> [&[f64]; 2] {
+        let rows = &self.slopes[2 * m * place..][..2 * m];
+        [&rows[..m], &rows[m..]]
     }
 
     /// For each term what is left, and its norm.
@@ -351,9 +455,10 @@ mod tests {
         });
         let clip = Clip::of(&loom);
         let source = vec![None; places.len()];
-        let way = Way::new((loom.pose(), &clip), &rough, places, &source, (8, 5));
+        let task = Task::default();
+        let way = Way::new((loom.pose(), &clip, &task), &rough, places, &source, (8, 5));
         let largest = |curve: &Curve| State::new(&way, curve.clone()).largest();
-        let evened = way.evened(&rough);
+        let evened = way.best(std::slice::from_ref(&rough)).unwrap().unwrap();
         assert!(largest(&evened) < largest(&rough));
         // the smooth motion's own control points are among the choices
         assert!(largest(&evened) < ENOUGH.max(1.05 * largest(curve)));
@@ -386,10 +491,11 @@ mod tests {
             .iter()
             .map(|place| Some((true, curve.at(*place))))
             .collect();
-        let way = Way::new((loom.pose(), &clip), curve, places, &source, (8, 5));
+        let task = Task::default();
+        let way = Way::new((loom.pose(), &clip, &task), curve, places, &source, (8, 5));
         assert!(State::new(&way, curve.clone()).largest() < 1e-12);
         let rough = curve.with_control(10, [0.0, 0.0]);
-        let evened = way.evened(&rough);
+        let evened = way.best(std::slice::from_ref(&rough)).unwrap().unwrap();
         assert!(State::new(&way, evened).largest() < 1e-3);
     }
 }

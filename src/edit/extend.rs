@@ -9,14 +9,15 @@ use crate::math::b_spline::{Curve, Place, Point};
 use crate::math::rotation;
 use crate::signal::root::{RootFrame, RootSignal};
 use crate::signal::time::TimeSignal;
+use crate::task::Task;
 
 /// The loom with `frames` frames more: around the loop again where the end meets the start (a step or
 /// less apart, moving on the same way), else on along the last speed. All former frames keep their bits,
-/// but for the two spans at a seam.
+/// but for the three spans at a seam.
 ///
 /// # Errors
-/// Too many frames; time that runs back and forth.
-pub fn extend(loom: &Loom, frames: usize) -> Result<Warned<Loom>> {
+/// Too many frames; time that runs back and forth; the task was cancelled.
+pub fn extend(loom: &Loom, frames: usize, task: &Task) -> Result<Warned<Loom>> {
     super::check_frames(frames)?;
     if frames == 0 {
         return Ok(Warned::clean(loom.clone()));
@@ -26,7 +27,7 @@ pub fn extend(loom: &Loom, frames: usize) -> Result<Warned<Loom>> {
         let passes = frames.div_ceil(loom.frames() - 1);
         // A pass takes as many frames each time as the way round: what shows is evened, not given more.
         let bridge = bridge_for(loom.time(), 1.0, last);
-        let looped = add_loop(loom, 1.0, last, passes, Some(bridge))?;
+        let looped = add_loop(loom, 1.0, last, passes, Some(bridge), task)?;
         let all = Warned::from(looped);
         let mut warnings = all.warnings;
         let output = trim(&all.output, 1.0, last + frames as f64)?.unpack(&mut warnings);
@@ -172,7 +173,7 @@ mod tests {
     fn it_goes_on_along_the_last_speed_and_former_frames_keep_their_bits() {
         for loom in [ring(10, 30, false), ring(10, 31, true)] {
             let n = loom.frames();
-            let longer = extend(&loom, 12).unwrap().output;
+            let longer = extend(&loom, 12, &Task::default()).unwrap().output;
             assert_eq!(longer.frames(), n + 12);
             for frame in (1..=n).map(|frame| frame as f64) {
                 assert_eq!(longer.at(frame).unwrap(), loom.at(frame).unwrap());
@@ -196,7 +197,7 @@ mod tests {
             .unwrap()
             .output;
         assert!(meets(loom.time()) && !meets(ring(10, 41, true).time()));
-        let longer = extend(&loom, 100).unwrap().output;
+        let longer = extend(&loom, 100, &Task::default()).unwrap().output;
         assert_eq!(longer.frames(), 141);
         // a pass takes 40 frames, the same each time
         for frame in (10..=30).map(f64::from) {
@@ -210,7 +211,7 @@ mod tests {
     fn root_motion_goes_on_and_backwards_too() {
         let loom = travelling(10, 30);
         for loom in [loom.clone(), reverse(&loom).unwrap()] {
-            let longer = extend(&loom, 5).unwrap().output;
+            let longer = extend(&loom, 5, &Task::default()).unwrap().output;
             for frame in (1..=30).map(f64::from) {
                 let (a, b) = (longer.at(frame).unwrap(), loom.at(frame).unwrap());
                 // turned, places are counted from the other end: a rounding, then single precision
@@ -230,7 +231,10 @@ mod tests {
     fn extending_what_was_trimmed_or_extended_is_possible() {
         let loom = ring(10, 30, false);
         let part = trim(&loom, 5.0, 19.0).unwrap().output;
-        let longer = extend(&extend(&part, 4).unwrap().output, 4).unwrap().output;
+        let task = Task::default();
+        let longer = extend(&extend(&part, 4, &task).unwrap().output, 4, &task)
+            .unwrap()
+            .output;
         assert_eq!(longer.frames(), 23);
         for frame in (1..=15).map(f64::from) {
             assert_eq!(longer.at(frame).unwrap(), loom.at(frame + 4.0).unwrap());
@@ -242,9 +246,9 @@ mod tests {
         let loom = ring(10, 30, false);
         let edit = Edit::Extend { frames: 7 };
         assert_eq!(
-            edit.apply(&loom).unwrap().output.time(),
-            extend(&loom, 7).unwrap().output.time()
+            edit.apply(&loom, &Task::default()).unwrap().output.time(),
+            extend(&loom, 7, &Task::default()).unwrap().output.time()
         );
-        assert!(extend(&loom, usize::MAX).is_err());
+        assert!(extend(&loom, usize::MAX, &Task::default()).is_err());
     }
 }

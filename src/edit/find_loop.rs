@@ -4,6 +4,7 @@
 use super::add_loop::{Looped, add_loop};
 use crate::diag::{Diagnostic, Result};
 use crate::loom::Loom;
+use crate::task::Task;
 
 /// How many loops are tried in earnest.
 const TRIED: usize = 12;
@@ -12,11 +13,11 @@ const TRIED: usize = 12;
 /// are most alike in shape and in speed (rigid motion apart) the one with the smallest worst ratio.
 ///
 /// # Errors
-/// No loop is that short or that long; those of [`add_loop`].
-pub fn find_loop(loom: &Loom, shortest: usize, longest: usize) -> Result<Looped> {
+/// No loop is that short or that long; those of [`add_loop`], `task` cancelled among them.
+pub fn find_loop(loom: &Loom, shortest: usize, longest: usize, task: &Task) -> Result<Looped> {
     let mut best: Option<Looped> = None;
     for (from, to) in alike(loom, shortest.max(1), longest)? {
-        let looped = add_loop(loom, from as f64, to as f64, 1, None)?;
+        let looped = add_loop(loom, from as f64, to as f64, 1, None, task)?;
         let better = |best: &Looped| looped.seam.worst() < best.seam.worst();
         if best.as_ref().is_none_or(better) {
             best = Some(looped);
@@ -65,7 +66,7 @@ mod tests {
 
     #[test]
     fn a_turn_of_the_ring_is_found() {
-        let found = find_loop(&ring(10, 60, true), 8, 40).unwrap();
+        let found = find_loop(&ring(10, 60, true), 8, 40, &Task::default()).unwrap();
         let (from, to) = found.stretch;
         // one turn takes 20.27 frames: 20 or 21, two of them 40
         let turns = (to - from) / 20.27;
@@ -76,7 +77,7 @@ mod tests {
     #[test]
     fn lengths_that_no_loop_has_are_refused() {
         let loom = ring(5, 12, true);
-        assert!(find_loop(&loom, 12, 30).is_err());
-        assert!(find_loop(&loom, 8, 4).is_err());
+        assert!(find_loop(&loom, 12, 30, &Task::default()).is_err());
+        assert!(find_loop(&loom, 8, 4, &Task::default()).is_err());
     }
 }

@@ -26,6 +26,7 @@ use crate::diag::{Diagnostic, Result, Warned};
 use crate::loom::Loom;
 use crate::math::b_spline::Point;
 use crate::signal::time::TimeError;
+use crate::task::Task;
 
 pub use add_loop::{Looped, add_loop};
 pub use add_pose::add_pose;
@@ -133,8 +134,8 @@ impl Edit {
     /// Does it.
     ///
     /// # Errors
-    /// What the verb says: times outside \[1, n\], counts and amounts that make no sense.
-    pub fn apply(&self, loom: &Loom) -> Result<Warned<Loom>> {
+    /// What the verb says: times outside \[1, n\], counts and amounts that make no sense; `task` was cancelled.
+    pub fn apply(&self, loom: &Loom, task: &Task) -> Result<Warned<Loom>> {
         match self {
             Edit::MoveControl { control, to } => clean(move_control(loom, *control, *to)),
             Edit::InsertControl { time } => clean(insert_control(loom, *time)),
@@ -143,8 +144,8 @@ impl Edit {
                 to,
                 times,
                 bridge,
-            } => Ok(add_loop(loom, *from, *to, *times, *bridge)?.into()),
-            Edit::Extend { frames } => extend(loom, *frames),
+            } => Ok(add_loop(loom, *from, *to, *times, *bridge, task)?.into()),
+            Edit::Extend { frames } => extend(loom, *frames, task),
             Edit::Trim { from, to } => trim(loom, *from, *to),
             Edit::Reverse => clean(reverse(loom)),
             Edit::Hold { time, frames } => clean(hold(loom, *time, *frames)),

@@ -240,6 +240,7 @@ mod tests {
     use crate::math::thin_plate::Rows;
     use crate::plot::Item;
     use crate::signal::warp::Warp;
+    use crate::task::Task;
     use crate::world::MemoryWorld;
 
     fn circle(n: usize) -> Vec<Point> {
@@ -300,7 +301,7 @@ mod tests {
             control: 4,
             to: [0.2, 0.1],
         };
-        let drawn = |edit: &Edit| plot_loom(&edit.apply(&loom).unwrap().output).0;
+        let drawn = |edit: &Edit| plot_loom(&edit.apply(&loom, &Task::default()).unwrap().output).0;
         for edit in [sketched, Edit::Reverse] {
             let map = drawn(&edit);
             assert_eq!((map.frames.len(), &map.frames), (15, &map.reached));

@@ -6,9 +6,12 @@
 //! for a flag of 180 frames with k = 54) and its length would not be whole. What is rounded is the length:
 //! the end moves to a whole number of frames after the beginning, which is returned and told. The two
 //! spans before a seam and the two after it turn from the one into the other so that what shows of it is
-//! least (a third, where a knot was put, changes by rounding); all other frames keep their bits. Where the
-//! ends lie apart, frames with spans of their own lead from one to the other.
+//! least; a third changes by rounding, or turns too where the seam lies within a span; all other frames keep
+//! their bits. The spans next to a seam are cut into pieces of about a frame: what the motion does within
+//! a frame, a few control points over ten frames cannot meet. Where the ends lie apart, frames with
+//! a span each lead from one to the other.
 
+mod cut;
 mod plan;
 mod root;
 
@@ -18,6 +21,7 @@ use crate::diag::{Diagnostic, Result, Warned};
 use crate::loom::Loom;
 use crate::math::b_spline::Point;
 use crate::signal::time::TimeSignal;
+use crate::task::Task;
 use plan::Plan;
 
 /// Seams above this show.
@@ -62,19 +66,21 @@ impl From<Looped> for Warned<Loom> {
 
 /// The loom that passes `times` times more through \[`from`, `to`\]. `to` is moved so that the loop takes
 /// whole frames. `bridge` frames go between two passes; none given: as many as the distance between the
-/// ends takes at the speed there (none where they meet), and a quarter more again and again until the
-/// seam does not show, at most two and a half times the loop (or 60). Frames outside the spans about a
-/// seam keep their bits; with root motion every pass adds the loop's increment.
+/// ends takes at the speed there (none where they meet), and a quarter to a half more again and again until
+/// the seam does not show, at most two and a half times the loop (or 60), and not where three times
+/// the frames show no less. Frames outside the spans about a seam keep their bits; with root motion
+/// every pass adds the loop's increment.
 ///
 /// # Errors
 /// The loop leaves \[1, n\], has no length or less than a frame; too many frames; time that runs back and
-/// forth; a loom that never moves.
+/// forth; a loom that never moves; `task` was cancelled.
 pub fn add_loop(
     loom: &Loom,
     from: f64,
     to: f64,
     times: usize,
     bridge: Option<usize>,
+    task: &Task,
 ) -> Result<Looped> {
     super::check_stretch(loom, from, to)?;
     let forward = forward(loom)?;
@@ -90,17 +96,23 @@ pub fn add_loop(
             .saturating_mul(times),
     )?;
     let clip = Clip::of(&forward.loom);
-    let attempt = |bridge: usize| Attempt::new(&forward.loom, &clip, (from, to), bridge);
-    let mut best = attempt(wanted)?;
+    let attempt = |bridge: usize, known: Option<&[Point]>| {
+        Attempt::new((&forward.loom, &clip, task), (from, to), bridge, known)
+    };
+    let mut best = attempt(wanted, None)?;
     // A seam that shows is given more time.
-    let (mut next, longest) = (wanted, most_bridged(length as usize));
+    let longest = most_bridged(length as usize);
+    let (mut last, mut shown) = (wanted, best.seam.worst());
     while bridge.is_none() && times > 0 && best.seam.worst() > SHOWS {
-        next = (5 * next).div_ceil(4).max(next + 1);
-        if next > longest {
+        let next = longer(last, shown).min(longest);
+        // Where so much more time shows no less, what is left is not the bridge's.
+        let most = (3 * best.plan.bridge).max(best.plan.bridge + 36);
+        if next <= last || next > most {
             break;
         }
-        let longer = attempt(next)?;
-        if longer.seam.worst() < best.seam.worst() {
+        let longer = attempt(next, Some(&best.eased))?;
+        (last, shown) = (next, longer.seam.worst());
+        if shown < best.seam.worst() {
             best = longer;
         }
     }
@@ -125,6 +137,12 @@ pub fn add_loop(
     })
 }
 
+/// Frames of the bridge to try after one that shows so much: accelerations fall as the square of the time.
+fn longer(frames: usize, shown: f64) -> usize {
+    let factor = (shown / SHOWS).sqrt().clamp(1.25, 1.5);
+    ((factor * frames as f64).ceil() as usize).max(frames + 1)
+}
+
 /// The longest bridge of a loop of so many frames.
 fn most_bridged(frames: usize) -> usize {
     5 * frames.max(24) / 2
@@ -141,9 +159,14 @@ struct Attempt {
 
 impl Attempt {
     /// With that many frames over the seam.
-    fn new(loom: &Loom, clip: &Clip, (from, to): (f64, f64), bridge: usize) -> Result<Self> {
+    fn new(
+        (loom, clip, task): (&Loom, &Clip, &Task),
+        (from, to): (f64, f64),
+        bridge: usize,
+        known: Option<&[Point]>,
+    ) -> Result<Self> {
         let plan = Plan::new(loom, from, to, bridge)?;
-        let eased = plan.eased(loom, clip)?;
+        let eased = plan.eased((loom, clip, task), known)?;
         let looped = plan.repeat(loom, 1, &eased)?;
         let last = to.floor() as usize;
         let again = (last + bridge + 1, from.floor() as usize + 1);
@@ -193,7 +216,7 @@ mod tests {
             (8.5, 25.5, 2, Some(0)),
             (1.0, 45.0, 1, None),
         ] {
-            let looped = add_loop(&loom, from, to, times, bridge).unwrap();
+            let looped = add_loop(&loom, from, to, times, bridge, &Task::default()).unwrap();
             let (n, longer) = (loom.frames(), looped.loom.frames());
             let pass = (to - from) as usize + looped.bridge;
             assert_eq!(longer, n + times * pass);
@@ -217,18 +240,23 @@ mod tests {
     fn control_points_grow_by_those_of_the_loop() {
         // a knot at every frame: no knot is put
         let loom = ring(10, 40, true);
-        let looped = add_loop(&loom, 10.0, 30.0, 1, Some(0)).unwrap().loom;
+        let looped = add_loop(&loom, 10.0, 30.0, 1, Some(0), &Task::default())
+            .unwrap()
+            .loom;
         assert_eq!(looped.frames(), 60);
         assert_eq!(looped.time().controls().len(), 42 + 20);
-        let bridged = add_loop(&loom, 10.0, 30.0, 2, Some(3)).unwrap().loom;
+        let bridged = add_loop(&loom, 10.0, 30.0, 2, Some(3), &Task::default())
+            .unwrap()
+            .loom;
         assert_eq!(bridged.frames(), 40 + 2 * 23);
-        assert_eq!(bridged.time().controls().len(), 42 + 2 * 23);
+        // three frames take four steps, a span each
+        assert_eq!(bridged.time().controls().len(), 42 + 2 * 24);
     }
 
     #[test]
     fn a_loop_that_closes_shows_no_seam_and_gets_no_bridge() {
         // one turn of the ring takes 20.27 frames
-        let looped = add_loop(&ring(10, 60, true), 15.0, 35.0, 2, None).unwrap();
+        let looped = add_loop(&ring(10, 60, true), 15.0, 35.0, 2, None, &Task::default()).unwrap();
         assert!(looped.bridge <= 1);
         assert!(looped.seam.worst() < SHOWS, "{:?}", looped.seam);
     }
@@ -236,8 +264,8 @@ mod tests {
     #[test]
     fn ends_that_lie_apart_are_bridged() {
         let loom = ring(10, 21, true);
-        let bare = add_loop(&loom, 7.0, 15.0, 1, Some(0)).unwrap();
-        let bridged = add_loop(&loom, 7.0, 15.0, 1, None).unwrap();
+        let bare = add_loop(&loom, 7.0, 15.0, 1, Some(0), &Task::default()).unwrap();
+        let bridged = add_loop(&loom, 7.0, 15.0, 1, None, &Task::default()).unwrap();
         assert!(bridged.bridge > 2);
         assert!(bridged.seam.worst() < 0.5 * bare.seam.worst());
         assert_eq!(Warned::from(bare).warnings.len(), 1);
@@ -248,7 +276,9 @@ mod tests {
         // the same motion from every frame to the next, within a loop, over a seam and a bridge
         let loom = travelling(10, 45);
         for (from, to, bridge) in [(10.0, 30.0, 0), (10.0, 30.0, 3), (10.5, 28.5, 2)] {
-            let looped = add_loop(&loom, from, to, 2, Some(bridge)).unwrap().loom;
+            let looped = add_loop(&loom, from, to, 2, Some(bridge), &Task::default())
+                .unwrap()
+                .loom;
             let at = |frame: usize| looped.root_at(frame as f64).unwrap();
             let step = |frame: usize| at(frame).inverse() * at(frame + 1);
             let first = step(4).to_matrix();
@@ -263,8 +293,21 @@ mod tests {
     #[test]
     fn a_reversed_loom_loops_where_it_says() {
         let loom = travelling(10, 45);
-        let there = reverse(&add_loop(&loom, 12.0, 32.0, 1, None).unwrap().loom).unwrap();
-        let here = add_loop(&reverse(&loom).unwrap(), 14.0, 34.0, 1, None).unwrap();
+        let there = reverse(
+            &add_loop(&loom, 12.0, 32.0, 1, None, &Task::default())
+                .unwrap()
+                .loom,
+        )
+        .unwrap();
+        let here = add_loop(
+            &reverse(&loom).unwrap(),
+            14.0,
+            34.0,
+            1,
+            None,
+            &Task::default(),
+        )
+        .unwrap();
         assert_eq!(
             (here.loom.time(), here.stretch),
             (there.time(), (14.0, 34.0))
@@ -275,7 +318,9 @@ mod tests {
     fn a_retimed_loom_loops_on_its_new_frames() {
         let loom = ring(10, 45, true);
         let slow = retime(&loom, &[[1.0, 1.0], [89.0, 45.0]]).unwrap();
-        let looped = add_loop(&slow, 21.0, 61.0, 1, Some(0)).unwrap().loom;
+        let looped = add_loop(&slow, 21.0, 61.0, 1, Some(0), &Task::default())
+            .unwrap()
+            .loom;
         assert_eq!(looped.frames(), 89 + 40);
         for frame in (1..=50).map(f64::from) {
             assert_eq!(looped.at(frame).unwrap(), slow.at(frame).unwrap());
@@ -292,22 +337,31 @@ mod tests {
             (3.0, 20.5),
             (f64::NAN, 4.0),
         ] {
-            assert!(add_loop(&loom, from, to, 1, None).is_err());
+            assert!(add_loop(&loom, from, to, 1, None, &Task::default()).is_err());
         }
-        assert!(add_loop(&loom, 3.0, 9.0, usize::MAX, None).is_err());
-        assert!(add_loop(&loom, 3.0, 9.0, 1, Some(usize::MAX)).is_err());
-        let none = add_loop(&loom, 3.0, 9.0, 0, None).unwrap();
+        assert!(add_loop(&loom, 3.0, 9.0, usize::MAX, None, &Task::default()).is_err());
+        assert!(add_loop(&loom, 3.0, 9.0, 1, Some(usize::MAX), &Task::default()).is_err());
+        let none = add_loop(&loom, 3.0, 9.0, 0, None, &Task::default()).unwrap();
         assert_eq!(none.loom.time(), loom.time());
+    }
+
+    #[test]
+    fn a_cancelled_loop_ends_at_once() {
+        let task = Task::default();
+        task.cancel();
+        let ended = add_loop(&ring(10, 45, false), 12.0, 31.0, 1, None, &task);
+        let why = ended.err().map(|why| why.severity);
+        assert_eq!(why, Some(crate::diag::Severity::Cancelled));
     }
 
     #[test]
     fn an_end_that_was_moved_is_told() {
         let loom = ring(10, 45, false);
-        let looped = add_loop(&loom, 12.25, 31.5, 1, None).unwrap();
+        let looped = add_loop(&loom, 12.25, 31.5, 1, None, &Task::default()).unwrap();
         assert_eq!((looped.stretch, looped.moved), ((12.25, 31.25), -0.25));
         let told = Warned::from(looped).warnings;
         assert!(told[0].message.contains("from 12.25 to 31.25"), "{told:?}");
-        let whole = add_loop(&loom, 12.0, 31.0, 1, None).unwrap();
+        let whole = add_loop(&loom, 12.0, 31.0, 1, None, &Task::default()).unwrap();
         assert_eq!(whole.moved, 0.0);
     }
 }

@@ -5,12 +5,17 @@ use crate::edit::bridge::{Way, through};
 use crate::edit::forward::assembled;
 use crate::edit::seam::Clip;
 use crate::loom::Loom;
-use crate::math::b_spline::{Curve, Inserted, Place, Point};
-use crate::math::curve_join::join;
+use crate::math::b_spline::{Curve, Place, Point};
+use crate::math::curve_join::{join, join_exactly};
 use crate::math::monotone;
 use crate::signal::time::TimeSignal;
+use crate::task::Task;
 
+use super::cut::Cut;
 use super::root;
+
+/// A bridge goes on at this part of the loop's mean rate at least, where its ends rest.
+const SLOWEST: f64 = 0.1;
 
 /// Where the loop begins and ends on the curve, and what goes between two passes.
 pub(super) struct Plan {
@@ -19,41 +24,19 @@ pub(super) struct Plan {
     /// Frames between two passes, and the lengths of their spans.
     pub(super) bridge: usize,
     spans: Vec<f64>,
-    /// Parameter from the last frame before the seam to it.
-    lead: f64,
-    /// For each frame of the bridge the parameter from that last frame on, and rho's slope.
-    steps: Vec<(f64, f64)>,
+    /// For each frame of the bridge its place in these spans, and rho's slope.
+    steps: Vec<(Place, f64)>,
+    /// Knots put into the last span before the seam and into the first after it, so that there is a control
+    /// point a frame: a seam is turned into within a frame or two.
+    before: Vec<Place>,
+    after: Vec<Place>,
+    /// How many spans more may change before the seam and after it: one where a knot was put, which changes
+    /// it by rounding anyway.
+    more: [usize; 2],
 }
 
-/// A curve with a knot at a place: the span that begins there, and how places move.
-struct Cut {
-    curve: Curve,
-    span: usize,
-    inserted: Option<Inserted>,
-}
-
-impl Cut {
-    fn new(curve: &Curve, place: Place) -> Self {
-        match curve.insert_knot(place) {
-            Some(inserted) => Cut {
-                curve: inserted.curve.clone(),
-                span: place.span + 1,
-                inserted: Some(inserted),
-            },
-            None => Cut {
-                curve: curve.clone(),
-                span: place.span + usize::from(place.offset > 0.0),
-                inserted: None,
-            },
-        }
-    }
-
-    fn place(&self, former: Place) -> Place {
-        self.inserted
-            .as_ref()
-            .map_or(former, |inserted| inserted.place(former))
-    }
-}
+/// Spans that one span beside a seam is cut into, at most.
+const MOST_PIECES: usize = 12;
 
 impl Plan {
     /// The plan with `bridge` frames between passes.
@@ -77,36 +60,27 @@ impl Plan {
         let right = right.min(time.places().len() - 1);
         let (l, r) = (time.places()[left], time.places()[right]);
         let lead = curve.distance(l, b).max(0.0);
-        let rest = lead + curve.distance(a, r).max(0.0);
-        let ends = [time.slopes()[left], time.slopes()[right]];
-        let count = (bridge + 1) as f64;
-        let rate = match 0.5 * (ends[0] + ends[1]) {
-            rate if rate > 0.0 => rate,
-            _ => pass / (to - from),
+        let rest = curve.distance(a, r).max(0.0);
+        // Parameter a frame; a rest has none, but its bridge needs spans.
+        let mean = pass / (to - from);
+        let rates = [left, right].map(|frame| time.slopes()[frame].max(SLOWEST * mean));
+        let (spans, steps) = match bridge {
+            0 => Default::default(),
+            frames => paced(frames, rates, (lead, rest)),
         };
-        let width = if bridge == 0 {
-            0.0
-        } else {
-            (count * rate - rest).max(0.5 * rate)
-        };
-        let whole = rest + width;
-        let slopes = bounded(ends, whole / count);
-        let steps = (1..=bridge)
-            .map(|i| monotone::piece(count, whole, slopes, i as f64))
-            .collect();
-        let density = (b.span - a.span + 1) as f64 / (to - from);
-        let spans = match bridge {
-            0 => 0,
-            // one a frame at least: it has to turn sooner than the motion does
-            frames => ((frames as f64 * density).round() as usize).max(frames),
-        };
+        let (before, after) = pieces(curve, (a, b), rates);
+        let within =
+            |place: Place| 0.0 < place.offset && place.offset < curve.span_length(place.span);
+        let more = [b, a].map(|end| usize::from(within(end) && b.span > a.span + 1));
         Ok(Plan {
             from,
             to,
             bridge,
-            spans: vec![width / spans.max(1) as f64; spans],
-            lead,
+            spans,
             steps,
+            before,
+            after,
+            more,
         })
     }
 
@@ -114,9 +88,32 @@ impl Plan {
     fn cuts(&self, time: &TimeSignal) -> [Cut; 3] {
         let place = |t: f64| time.place_at(t).map(|(place, _)| place).unwrap_or_default();
         let (a, b) = (place(self.from), place(self.to));
-        let (end, start) = (Cut::new(time.curve(), b), Cut::new(time.curve(), a));
-        let middle = Cut::new(&start.curve, start.place(b));
+        let end = Cut::new(time.curve(), b, &self.before);
+        let start = Cut::new(time.curve(), a, &self.after);
+        let before: Vec<Place> = self.before.iter().map(|&p| start.place(p)).collect();
+        let middle = Cut::new(&start.curve, start.place(b), &before);
         [end, middle, start]
+    }
+
+    /// How many free control points there are before those of the bridge: they act on the spans that may
+    /// change and on none before.
+    fn lead(&self) -> usize {
+        self.before.len() + self.more[0]
+    }
+
+    /// How many there are after those of the bridge.
+    fn trail(&self) -> usize {
+        self.after.len() + self.more[1]
+    }
+
+    /// The number of the first free control point of a curve joined after `left`.
+    fn first(&self, left: &Cut) -> usize {
+        left.span + 1 - self.lead()
+    }
+
+    /// How many free control points there are.
+    fn count(&self) -> usize {
+        self.lead() + self.spans.len() + 1 + self.trail()
     }
 
     /// The loom with `times` passes more, control points `eased` over each seam.
@@ -129,8 +126,9 @@ impl Plan {
         let frames = self.frames(time, times, (&end, &middle, &start));
         let pass = |left: &Cut, right: &Curve| {
             let joined = join((&left.curve, left.span), (right, start.span), &self.spans)?;
-            let set =
-                |curve: Curve, (j, at): (usize, &Point)| curve.with_control(left.span + 1 + j, *at);
+            let set = |curve: Curve, (j, at): (usize, &Point)| {
+                curve.with_control(self.first(left) + j, *at)
+            };
             Some(eased.iter().enumerate().fold(joined, set))
         };
         let mut curve = start.curve.clone();
@@ -154,15 +152,20 @@ impl Plan {
         assembled(loom, time, root)
     }
 
-    /// The control points over a seam that let it show least.
-    pub(super) fn eased(&self, loom: &Loom, clip: &Clip) -> Result<Vec<Point>> {
+    /// The control points over a seam that let it show least; `known` are those of a shorter bridge.
+    pub(super) fn eased(
+        &self,
+        (loom, clip, task): (&Loom, &Clip, &Task),
+        known: Option<&[Point]>,
+    ) -> Result<Vec<Point>> {
         let [end, middle, start] = self.cuts(loom.time());
         let (left, right) = ((&end.curve, end.span), (&start.curve, start.span));
         let joined = join(left, right, &self.spans).ok_or_else(unjoined)?;
         let frames = self.frames(loom.time(), 1, (&end, &middle, &start));
         // Frames of the spans that change, and two on each side.
         let seam = end.span;
-        let (least, most) = (seam.saturating_sub(2), seam + self.spans.len() + 2);
+        let least = seam.saturating_sub(2 + self.lead());
+        let most = seam + self.spans.len() + 2 + self.trail();
         let inside = |frame: &Frame| (least..most).contains(&frame.place.span);
         let first = frames.iter().position(inside).unwrap_or(0);
         let last = frames.iter().rposition(inside).unwrap_or(0);
@@ -186,26 +189,37 @@ impl Plan {
             }
         };
         let source: Vec<_> = places.iter().map(source).collect();
-        let (free, count) = (seam + 1, self.spans.len() + 1);
+        let (free, count) = (self.first(&end), self.count());
         let way = Way::new(
-            (loom.pose(), clip),
+            (loom.pose(), clip, task),
             &joined,
             &places,
             &source,
             (free, count),
         );
-        let (a, b) = (self.from.round() as usize, self.to.round() as usize);
-        let shapes = through(clip, b - 1, a - 1);
-        let place = |frame: usize| loom.time().at((frame + 1) as f64).unwrap_or_default();
-        let known: Vec<Point> = shapes.into_iter().map(place).collect();
-        let straight = [place(b - 1), place(a - 1)];
-        let starts = [
-            joined.clone(),
-            way.laid(&joined, &known),
-            way.laid(&joined, &straight),
-        ];
-        let curve = way.best(&starts).ok_or_else(unjoined)?;
+        let mut starts = vec![joined];
+        if let Some(exact) = join_exactly(left, right, &self.spans) {
+            // The first and last control points of the bridge hold what was there.
+            let inner = (self.lead() + 2, self.spans.len() - 3);
+            let (a, b) = (self.from.round() as usize, self.to.round() as usize);
+            let place = |frame: usize| loom.time().at((frame + 1) as f64).unwrap_or_default();
+            let shapes = through(clip, b - 1, a - 1).into_iter().map(place);
+            let straight = [place(b - 1), place(a - 1)];
+            starts.push(way.laid(&exact, inner, &shapes.collect::<Vec<_>>()));
+            starts.push(way.laid(&exact, inner, &straight));
+            if let Some(known) = known.and_then(|known| self.inner_of(known)) {
+                starts.push(way.laid(&exact, inner, known));
+            }
+            starts.push(exact);
+        }
+        let curve = way.best(&starts)?.ok_or_else(unjoined)?;
         Ok(curve.controls()[free..][..count].to_vec())
+    }
+
+    /// Of control points over a seam those in the midst of the bridge.
+    fn inner_of<'a>(&self, eased: &'a [Point]) -> Option<&'a [Point]> {
+        let (lead, trail) = (self.lead() + 1, self.trail() + 1);
+        eased.get(lead..eased.len().checked_sub(trail)?)
     }
 
     /// All frames: those up to the end of the loop, then for each pass the bridge and the frames inside,
@@ -221,7 +235,7 @@ impl Plan {
         };
         let place = |frame: usize| time.places()[frame];
         let mut frames: Vec<Frame> = (0..last)
-            .map(|i| kept(i, 0, knot_before(end, end.place(place(i)))))
+            .map(|i| kept(i, 0, end.place_before(place(i))))
             .collect();
         let mut shift = end.span;
         for pass in 1..=times {
@@ -232,7 +246,7 @@ impl Plan {
                 ..place
             };
             if pass < times {
-                let inside = |i: usize| knot_before(middle, middle.place(start.place(place(i))));
+                let inside = |i: usize| middle.place_before(start.place(place(i)));
                 frames.extend((first..last).map(|i| kept(i, pass, moved(inside(i)))));
                 shift += middle.span - start.span;
             } else {
@@ -245,22 +259,18 @@ impl Plan {
 
     /// The bridge's frames, its spans beginning at span `start` of the curve.
     fn bridge_frames(&self, pass: usize, start: usize) -> impl Iterator<Item = Frame> + '_ {
-        let width = self.spans.first().copied().unwrap_or(0.0);
-        let total: f64 = width * self.spans.len() as f64;
-        self.steps.iter().enumerate().map(move |(i, (y, slope))| {
-            let y = (y - self.lead).clamp(0.0, total);
-            let span = ((y / width) as usize).min(self.spans.len() - 1);
-            let place = Place {
-                span: start + span,
-                offset: (y - span as f64 * width).clamp(0.0, width),
-            };
-            Frame {
-                place,
+        self.steps
+            .iter()
+            .enumerate()
+            .map(move |(i, (place, slope))| Frame {
+                place: Place {
+                    span: start + place.span,
+                    offset: place.offset,
+                },
                 slope: *slope,
                 source: Source::Bridge(i + 1),
                 pass,
-            }
-        })
+            })
     }
 }
 
@@ -268,22 +278,79 @@ fn unjoined() -> Box<Diagnostic> {
     Box::new(Diagnostic::error("the ends of the loop cannot be joined"))
 }
 
-/// Slopes brought into the disc of radius 3 about a secant.
-fn bounded(slopes: [f64; 2], secant: f64) -> [f64; 2] {
-    let limited = monotone::limited(&[secant], &slopes);
-    [limited[0], limited[1]]
+/// Spans of a bridge and, for each of its frames, the place in them and rho's slope. From step to step the
+/// parameter grows evenly from the rate before the seam to that after it; `beside` is how much of the first
+/// and the last step lies before and after the bridge. There is a span a step: where steps are whole, a
+/// knot at every frame.
+fn paced(frames: usize, rates: [f64; 2], beside: (f64, f64)) -> (Vec<f64>, Vec<(Place, f64)>) {
+    let count = frames + 1;
+    let step = |i: usize| {
+        let part = (i as f64 + 0.5) / count as f64;
+        rates[0] * libm::pow(rates[1] / rates[0], part)
+    };
+    let mut steps: Vec<f64> = (0..count).map(step).collect();
+    let outside = beside.0 + beside.1;
+    // at least half a step is the bridge's own
+    let least = outside + 0.25 * (rates[0] + rates[1]);
+    let longer = (least / steps.iter().sum::<f64>()).max(1.0);
+    steps.iter_mut().for_each(|step| *step *= longer);
+    let whole: f64 = steps.iter().sum();
+    let spans: Vec<f64> = steps
+        .iter()
+        .map(|step| step * ((whole - outside) / whole))
+        .collect();
+    let mut at = -beside.0;
+    let places = steps.windows(2).map(|pair| {
+        at += pair[0];
+        let mut place = Place {
+            span: 0,
+            offset: at.max(0.0),
+        };
+        while place.span + 1 < spans.len() && place.offset > spans[place.span] {
+            place.offset -= spans[place.span];
+            place.span += 1;
+        }
+        place.offset = place.offset.min(spans[place.span]);
+        (place, 0.5 * (pair[0] + pair[1]))
+    });
+    let places = places.collect();
+    (spans, places)
 }
 
-/// A place at the knot where the loop ends, as the end of the span before it: what follows there is
-/// another part of the curve.
-fn knot_before(cut: &Cut, place: Place) -> Place {
-    if place.span == cut.span && place.offset == 0.0 && cut.span > 0 {
-        return Place {
-            span: cut.span - 1,
-            offset: cut.curve.span_length(cut.span - 1),
-        };
+/// Knots in the span that ends at b and in the one that begins at a, so that each piece takes about a frame
+/// at these rates; none where these are one span.
+fn pieces(curve: &Curve, (a, b): (Place, Place), rates: [f64; 2]) -> (Vec<Place>, Vec<Place>) {
+    let length = |span: usize| curve.span_length(span);
+    let b = match b.span.checked_sub(1) {
+        Some(span) if b.offset == 0.0 => Place {
+            span,
+            offset: length(span),
+        },
+        _ => b,
+    };
+    let a = match a.offset == length(a.span) && a.span + 1 < curve.spans() {
+        true => Place {
+            span: a.span + 1,
+            offset: 0.0,
+        },
+        false => a,
+    };
+    if a.span >= b.span {
+        return (Vec::new(), Vec::new());
     }
-    place
+    let cut = |span: usize, from: f64, to: f64, rate: f64| {
+        let pieces = ((to - from) / rate).round().clamp(1.0, MOST_PIECES as f64);
+        let knot = |i: usize| from + (to - from) * i as f64 / pieces;
+        let place = |i: usize| Place {
+            span,
+            offset: knot(i),
+        };
+        (1..pieces as usize).map(place).collect()
+    };
+    (
+        cut(b.span, 0.0, b.offset, rates[0]),
+        cut(a.span, a.offset, length(a.span), rates[1]),
+    )
 }
 
 /// A frame of the longer loom.
@@ -300,4 +367,69 @@ pub(super) enum Source {
     Frame(usize),
     /// The bridge's frame, from 1.
     Bridge(usize),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::loom::test_looms::ring;
+
+    #[test]
+    fn steps_of_a_bridge_grow_evenly_from_rate_to_rate() {
+        for (frames, rates, beside) in [
+            (1, [1.0, 1.0], (0.0, 0.0)),
+            (9, [0.2, 3.0], (0.0, 0.0)),
+            (4, [2.0, 1.0], (0.5, 0.25)),
+            (1, [0.1, 0.1], (1.0, 1.0)),
+        ] {
+            let (spans, places) = paced(frames, rates, beside);
+            assert_eq!((spans.len(), places.len()), (frames + 1, frames));
+            assert!(spans.iter().all(|&w| w > 0.0));
+            let at = |place: &Place| spans[..place.span].iter().sum::<f64>() + place.offset;
+            let mut all = vec![-beside.0];
+            all.extend(places.iter().map(|(place, _)| at(place)));
+            all.push(spans.iter().sum::<f64>() + beside.1);
+            let steps: Vec<f64> = all.windows(2).map(|pair| pair[1] - pair[0]).collect();
+            if steps[0] > beside.0 {
+                let ratio = steps[1] / steps[0];
+                let even = |pair: &[f64]| (pair[1] / pair[0] - ratio).abs() < 1e-9 * ratio;
+                assert!(steps.windows(2).all(even), "{steps:?}");
+            }
+            if beside == (0.0, 0.0) {
+                // a knot at every frame
+                assert!(
+                    all.windows(2)
+                        .zip(&spans)
+                        .all(|(p, w)| (p[1] - p[0] - w).abs() < 1e-9)
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn spans_beside_a_seam_are_cut_into_frames() {
+        let loom = ring(5, 60, false);
+        let time = loom.time();
+        let place = |t: f64| time.place_at(t).unwrap().0;
+        let (a, b) = (place(10.0), place(50.0));
+        let rates = [time.slopes()[49], time.slopes()[9]];
+        let (before, after) = pieces(time.curve(), (a, b), rates.map(|rate| 0.25 * rate));
+        assert!(!before.is_empty() && !after.is_empty());
+        assert!(
+            before
+                .iter()
+                .all(|p| p.span == b.span && p.offset < b.offset)
+        );
+        assert!(
+            after
+                .iter()
+                .all(|p| p.span == a.span && p.offset > a.offset)
+        );
+        // ends within one span share it
+        let near = Place {
+            offset: 0.5 * a.offset,
+            ..a
+        };
+        assert_eq!(pieces(time.curve(), (near, a), rates), (vec![], vec![]));
+    }
 }

@@ -20,7 +20,6 @@
 mod both_ways;
 mod closing;
 mod damping;
-mod evening;
 mod fans;
 mod finishing;
 mod guard;
@@ -40,7 +39,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use closing::Closer;
 use fans::Fans;
-use finishing::{Finisher, Wanted};
+use finishing::Finisher;
 use placing::Placer;
 use shape::point;
 
@@ -251,12 +250,9 @@ impl Embedding {
             .placer
             .place(&self.fans, &corners, &angles, lengths, &oriented);
         let kept = &mut memory.finishing;
-        let wanted = Wanted {
-            edges: self.edges(),
-            lengths,
-            spring: None,
-        };
-        let finished = self.finisher.finish(&wanted, &mut positions, kept);
+        let finished = self
+            .finisher
+            .finish(self.edges(), lengths, &mut positions, kept);
         let mirrored = self.reflect_mirrored(dihedrals, &mut positions);
         self.lay_on(guide, &mut positions);
         Ok(Embedded {

@@ -92,7 +92,9 @@ impl Workbench {
     pub fn edit(&self, loom: &LoomValue, edit: &Edit) -> Result<Warned<LoomValue>> {
         self.task.check()?;
         let mut warnings = Vec::new();
-        let edited = edit.apply(&loom.loom.value)?.unpack(&mut warnings);
+        let edited = edit
+            .apply(&loom.loom.value, &self.task)?
+            .unpack(&mut warnings);
         let key = loom.loom.then("edit").text(&format!("{edit:?}")).finish();
         let edits = loom.edits.iter().cloned().chain([edit.clone()]).collect();
         let output = LoomValue {
@@ -226,7 +228,7 @@ impl Workbench {
     /// # Errors
     /// The stretch leaves the loom or has no length.
     pub fn seam(&self, loom: &LoomValue, from: f64, to: f64) -> Result<serde_json::Value> {
-        let seam = add_loop(&loom.loom.value, from, to, 1, None)?.seam;
+        let seam = add_loop(&loom.loom.value, from, to, 1, None, &self.task)?.seam;
         Ok(serde_json::json!({
             "step": seam.step,
             "velocity": seam.velocity,
@@ -240,7 +242,7 @@ impl Workbench {
     /// # Errors
     /// As [`find_loop`].
     pub fn find_loop(&self, loom: &LoomValue, shortest: usize, longest: usize) -> Result<[f64; 2]> {
-        let (from, to) = find_loop(&loom.loom.value, shortest, longest)?.stretch;
+        let (from, to) = find_loop(&loom.loom.value, shortest, longest, &self.task)?.stretch;
         Ok([from, to])
     }
 

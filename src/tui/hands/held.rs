@@ -310,6 +310,7 @@ fn release(state: &mut State) -> Option<Held> {
 mod tests {
     use super::*;
     use crate::loom::test_looms::ring;
+    use crate::task::Task;
 
     #[test]
     fn a_moment_keeps_between_its_neighbours() {
@@ -337,7 +338,10 @@ mod tests {
     fn keys_that_the_recipe_ends_in_are_taken_up() {
         let loom = ring(20, 15, false);
         let keys = vec![[1.0, 1.0], [5.0, 9.0], [15.0, 15.0]];
-        let loom = Edit::Retime { keys }.apply(&loom).unwrap().output;
+        let loom = Edit::Retime { keys }
+            .apply(&loom, &Task::default())
+            .unwrap()
+            .output;
         let recipe = "a.retime([[1, 1], [5, 9], [15, 15]])";
         let moment = Moment::at(&loom, recipe, 5.2).unwrap();
         assert_eq!((moment.again, moment.keys[moment.key]), (true, [5.0, 9.0]));

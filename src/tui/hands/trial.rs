@@ -73,11 +73,11 @@ impl Trials {
         };
         let loom = &*base.of.0;
         let shown = match &what {
-            What::Edit(edit) => edit.apply(loom)?.output,
+            What::Edit(edit) => edit.apply(loom, &Task::default())?.output,
             What::RetimeAgain(keys) => {
                 let keys = keys.clone();
                 Edit::Retime { keys }
-                    .apply(&without_last_warp(loom)?)?
+                    .apply(&without_last_warp(loom)?, &Task::default())?
                     .output
             }
             What::Pin(frame, to, of) => self.pinned(of, *frame, *to)?,
@@ -96,9 +96,9 @@ impl Trials {
         let signals = session.drag(frame, to, &Task::default())?;
         let loom = session.loom(&fitted.0, signals);
         self.session = Some((fitted.clone(), session));
-        of.edits
-            .iter()
-            .try_fold(loom?, |loom, edit| Ok(edit.apply(&loom)?.output))
+        of.edits.iter().try_fold(loom?, |loom, edit| {
+            Ok(edit.apply(&loom, &Task::default())?.output)
+        })
     }
 }
 
@@ -150,7 +150,10 @@ mod tests {
             to: [0.5, 0.25],
         };
         let shown = tried(&loom, What::Edit(edit.clone()));
-        assert_eq!(shown.time(), edit.apply(&loom).unwrap().output.time());
+        assert_eq!(
+            shown.time(),
+            edit.apply(&loom, &Task::default()).unwrap().output.time()
+        );
     }
 
     /// A strip that bends and comes back, fitted by the method whose layout is the plain one.
@@ -181,7 +184,7 @@ mod tests {
             time: 5.0,
             frames: 3,
         };
-        let edited = edit.apply(&fitted).unwrap().output;
+        let edited = edit.apply(&fitted, &Task::default()).unwrap().output;
         let at = fitted.layout().positions[6];
         let to = [1.1 * at[0] + 0.01, 1.1 * at[1]];
         let pinning = |edits: &[Edit]| Pinning {
@@ -196,7 +199,10 @@ mod tests {
         );
         assert_eq!(shown.frames(), fitted.frames() + 3);
         assert_eq!(shown.layout().pins, [(6, to)]);
-        assert_eq!(shown.time(), edit.apply(&bare).unwrap().output.time());
+        assert_eq!(
+            shown.time(),
+            edit.apply(&bare, &Task::default()).unwrap().output.time()
+        );
     }
 
     #[test]
@@ -204,7 +210,10 @@ mod tests {
         let loom = ring(20, 15, false);
         let retimed = |keys: &[[f64; 2]]| {
             let keys = keys.to_vec();
-            Edit::Retime { keys }.apply(&loom).unwrap().output
+            Edit::Retime { keys }
+                .apply(&loom, &Task::default())
+                .unwrap()
+                .output
         };
         let once = retimed(&[[1.0, 1.0], [9.0, 15.0]]);
         let keys = vec![[1.0, 1.0], [4.0, 9.0], [20.0, 15.0]];
