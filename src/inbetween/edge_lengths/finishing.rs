@@ -40,6 +40,24 @@ const GAUGE: f64 = 1e-12;
 /// Damping, in parts of each edge's stiffness: at the start, least and most.
 const DAMPING: [f64; 3] = [1e-6, 1e-9, 1e4];
 
+/// What positions should have.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Wanted<'a> {
+    /// The two vertices of each edge.
+    pub(super) edges: &'a [[u32; 2]],
+    /// Its length.
+    pub(super) lengths: &'a [f64],
+    /// A place to stay near.
+    pub(super) spring: Option<Spring<'a>>,
+}
+
+/// Adds `stiffness` |x - anchor|^2 to what is minimised.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Spring<'a> {
+    pub(super) anchor: &'a [f64],
+    pub(super) stiffness: f64,
+}
+
 /// The least-squares problem of one connectivity.
 #[derive(Debug)]
 pub(super) struct Finisher {
@@ -57,21 +75,20 @@ impl Finisher {
     /// factorisations.
     pub(super) fn finish(
         &self,
-        edges: &[[u32; 2]],
-        lengths: &[f64],
+        wanted: &Wanted,
         positions: &mut [f64],
         kept: &mut Option<Factor>,
     ) -> usize {
-        let weights = weights(lengths);
-        let misfit = |positions: &[f64]| Misfit::new(edges, lengths, &weights, positions);
+        let weights = weights(wanted.lengths);
+        let misfit = |positions: &[f64]| Misfit::new(wanted, &weights, positions);
         let mut left = misfit(positions);
-        let enough = MET * MET * edges.len() as f64;
+        let enough = MET * MET * wanted.edges.len() as f64;
         let met = |left: &Misfit| left.cost <= enough && left.worst <= UNSEEN;
         let mut damping = Damping::new(DAMPING);
         let (mut steps, mut idle) = (0, 0);
         while !met(&left) && steps < STEPS && !damping.spent() && idle < IDLE {
             steps += 1;
-            let step = self.step(edges, lengths, &weights, positions, damping.value(), kept);
+            let step = self.step(wanted, &weights, positions, damping.value(), kept);
             let better = step
                 .map(|(step, promised)| {
                     let moved = positions.iter().zip(&step).map(|(x, d)| x - d);
@@ -99,8 +116,7 @@ impl Finisher {
 
     fn step(
         &self,
-        edges: &[[u32; 2]],
-        lengths: &[f64],
+        wanted: &Wanted,
         weights: &[f64],
         positions: &[f64],
         damping: f64,
@@ -108,14 +124,14 @@ impl Finisher {
     ) -> Option<(Vec<f64>, f64)> {
         let mut entries = vec![0.0; self.pattern.analysis().pattern().entries()];
         let mut side = vec![0.0; positions.len()];
-        for (edge, &[a, b]) in edges.iter().enumerate() {
+        for (edge, &[a, b]) in wanted.edges.iter().enumerate() {
             let e = point(positions, b) - point(positions, a);
             let length = e.norm();
             if length == 0.0 {
                 continue;
             }
             let (e, weight) = (e / length, weights[edge]);
-            let off = length - lengths[edge];
+            let off = length - wanted.lengths[edge];
             let pull = e * (weight * off);
             for axis in 0..3 {
                 side[3 * a as usize + axis] -= pull[axis];
@@ -129,6 +145,12 @@ impl Finisher {
         }
         let shift = GAUGE * self.pattern.mean_diagonal(&entries);
         self.pattern.shift(&mut entries, shift);
+        if let Some(Spring { anchor, stiffness }) = wanted.spring {
+            self.pattern.shift(&mut entries, stiffness);
+            for ((side, x), anchor) in side.iter_mut().zip(positions).zip(anchor) {
+                *side += stiffness * (x - anchor);
+            }
+        }
         match kept {
             Some(factor) => factor.refactor(&entries).ok()?,
             None => *kept = Some(self.pattern.analysis().factor(&entries).ok()?),
@@ -158,15 +180,15 @@ fn weights(lengths: &[f64]) -> Vec<f64> {
 
 /// How far lengths are from those asked for, short edges counted longer.
 struct Misfit {
-    /// The sum of the squared relative errors.
+    /// The sum of the squared relative errors, and what the spring adds.
     cost: f64,
     /// The largest relative error.
     worst: f64,
 }
 
 impl Misfit {
-    fn new(edges: &[[u32; 2]], lengths: &[f64], weights: &[f64], positions: &[f64]) -> Self {
-        let each = edges.iter().zip(lengths).zip(weights);
+    fn new(wanted: &Wanted, weights: &[f64], positions: &[f64]) -> Self {
+        let each = wanted.edges.iter().zip(wanted.lengths).zip(weights);
         let squares = each.map(|((&[a, b], length), weight)| {
             let off = (point(positions, b) - point(positions, a)).norm() - length;
             weight * off * off
@@ -175,6 +197,10 @@ impl Misfit {
         for square in squares {
             cost += square;
             largest = largest.max(square);
+        }
+        if let Some(Spring { anchor, stiffness }) = wanted.spring {
+            let pairs = positions.iter().zip(anchor);
+            cost += stiffness * pairs.map(|(x, a)| (x - a) * (x - a)).sum::<f64>();
         }
         Misfit {
             cost,

@@ -13,6 +13,7 @@
 
 use nalgebra::Vector3;
 
+use super::finishing::Wanted;
 use super::sequence::{Follower, pose_of};
 use super::{Embedded, Embedding, Target, wrapped};
 use crate::mesh::rigid_align::mean;
@@ -218,7 +219,8 @@ impl Guard<'_> {
 
     /// Blends the frames around a jump that no path avoids; poses stay. Of two ways that with the smaller
     /// edge errors is taken: lengths and dihedral angles blended between the frames before and after, or
-    /// both branches followed to each frame and their shapes blended, which moves only what turns over.
+    /// both branches followed to each frame and their shapes blended, which moves only what turns over. Where
+    /// shapes with nearly the lengths lead across, the frames are evened out along those.
     fn smooth(
         &self,
         frame: usize,
@@ -247,10 +249,34 @@ impl Guard<'_> {
             each.fold(0.0, f64::max)
         };
         let best = measured.min_by(|a, b| worst(a).total_cmp(&worst(b)));
-        if let Some(best) = best {
+        if let Some(mut best) = best {
+            if let Some(evened) = self.evened(first, last, frames, &best)
+                && worst(&evened) < worst(&best)
+            {
+                best = evened;
+            }
             frames[first + 1..last].clone_from_slice(&best);
         }
         Ok((Some(Mending::Blended { frames: count }), last + 1))
+    }
+
+    /// The frames between two, evened out from a blend of them.
+    fn evened(
+        &self,
+        first: usize,
+        last: usize,
+        frames: &[Embedded],
+        blend: &[Embedded],
+    ) -> Option<Vec<Embedded>> {
+        let ends = [&frames[first], &frames[last]];
+        let path = ends[..1].iter().copied().chain(blend).chain([ends[1]]);
+        let path: Vec<Vec<f64>> = path.map(|found| found.positions.clone()).collect();
+        let lengths = (first + 1..last).map(|at| (self.blend)(&self.weights[at]).lengths);
+        let lengths: Vec<Vec<f64>> = lengths.collect();
+        let made = self.embedding.evened(path, &lengths)?;
+        let each = (first + 1..last).zip(made);
+        let measured = each.map(|(at, positions)| self.measured(at, positions, &frames[at]));
+        Some(measured.collect())
     }
 
     /// The shapes between two frames, each from the branches of both, blended; none where one cannot be
@@ -298,8 +324,13 @@ impl Guard<'_> {
                 *length = own;
             }
         }
+        let wanted = Wanted {
+            edges,
+            lengths: &lengths,
+            spring: None,
+        };
         let finisher = &self.embedding.finisher;
-        finisher.finish(edges, &lengths, positions, &mut None);
+        finisher.finish(&wanted, positions, &mut None);
     }
 
     /// A shape that was not embedded, measured against the lengths of its frame.

@@ -20,6 +20,7 @@
 mod both_ways;
 mod closing;
 mod damping;
+mod evening;
 mod fans;
 mod finishing;
 mod guard;
@@ -39,7 +40,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use closing::Closer;
 use fans::Fans;
-use finishing::Finisher;
+use finishing::{Finisher, Wanted};
 use placing::Placer;
 use shape::point;
 
@@ -250,9 +251,12 @@ impl Embedding {
             .placer
             .place(&self.fans, &corners, &angles, lengths, &oriented);
         let kept = &mut memory.finishing;
-        let finished = self
-            .finisher
-            .finish(self.edges(), lengths, &mut positions, kept);
+        let wanted = Wanted {
+            edges: self.edges(),
+            lengths,
+            spring: None,
+        };
+        let finished = self.finisher.finish(&wanted, &mut positions, kept);
         let mirrored = self.reflect_mirrored(dihedrals, &mut positions);
         self.lay_on(guide, &mut positions);
         Ok(Embedded {
