@@ -80,6 +80,11 @@ impl Quality {
         }
     }
 
+    /// Whether there is a place where it is seen.
+    pub(super) fn is_seen(&self) -> bool {
+        self.worst > VISIBLE
+    }
+
     /// How bad: the deviation between the samples, the more the more it is seen in one place.
     pub(super) fn cost(&self) -> f64 {
         self.between * (self.worst / VISIBLE).max(1.0).sqrt()

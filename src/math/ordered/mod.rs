@@ -9,6 +9,7 @@
 //! - `layout`: the frames are laid out by distances along the motion (geodesics of the order graph),
 //!   then walked towards plain distances as long as no saddle between the frames results;
 //! - `refine`: curve and sites together, by variable projection;
+//! - `rounds`: again, where that is not enough, with other weights and other sites;
 //! - `check`: what is not right between the samples sends the fit back to the next layout in reserve;
 //! - `drag`: a few steps from the last state while a pin is moved.
 //!
@@ -19,12 +20,14 @@ mod check;
 mod drag;
 mod layout;
 mod refine;
+mod rounds;
 mod samples;
 
 use faer::{Mat, MatRef};
 
 use self::layout::{Candidate, Order};
 use self::refine::{Draft, LOOSE, firm};
+use self::rounds::Rounds;
 use self::samples::{Curve, Samples};
 use super::b_spline::Point;
 use super::layout::Distances;
@@ -40,14 +43,6 @@ pub use layout::Choice;
 const CLEARLY: f64 = 1.75;
 /// The same for a fit that has a spike: the layout must not depend on the fidelity, unless it ruins a fit.
 const RUINED: f64 = 3.0;
-
-/// Rounds of refinement that a fit which is not yet right is given, times its frames squared; at least and at
-/// most so many.
-const ROUNDS: usize = 120_000;
-const FEW: usize = 4;
-const MANY: usize = 48;
-/// So many rounds one after the other that do not help are the last.
-const IDLE: usize = 8;
 
 /// Fidelity of an ordered fit.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -274,38 +269,15 @@ impl Ground {
                 .refined(samples, &curve, pins, LOOSE, task)?,
         };
         task.step();
-        let draft = self.firm(draft, &curve, pins, task)?;
-        task.step();
+        let rounds = Rounds {
+            samples,
+            curve: &curve,
+            pins,
+            floor: self.floor,
+            task,
+        };
+        let draft = rounds.run(draft)?;
         Ok(self.fitted(draft, &curve, &candidate))
-    }
-
-    /// Refined to the end, held less firmly: as long as more than allowed is missed somewhere and more rounds
-    /// help, in which what is seen counts more.
-    fn firm(
-        &self,
-        draft: Draft,
-        curve: &Curve,
-        pins: &[(usize, Point)],
-        task: &Task,
-    ) -> Result<Draft, Cancelled> {
-        let (samples, round) = (&self.samples, firm(self.samples.frames));
-        let mut best = draft.refined(samples, curve, pins, round, task)?;
-        let mut excess = best.quality(samples, curve, self.floor).excess;
-        let (mut next, mut idle) = (best.clone(), 0);
-        for _ in 0..(ROUNDS / (samples.frames * samples.frames)).clamp(FEW, MANY) {
-            if excess <= 1.0 || idle == IDLE {
-                break;
-            }
-            next = next
-                .reweighted(samples, curve)
-                .refined(samples, curve, pins, round, task)?;
-            let after = next.quality(samples, curve, self.floor).excess;
-            idle += 1;
-            if after < excess {
-                (best, excess, idle) = (next.clone(), after, 0);
-            }
-        }
-        Ok(best)
     }
 
     /// A spiked fit refined once more with twice as many samples: what was between them is now met.

@@ -18,6 +18,9 @@ const STRAYING: f64 = 0.05;
 /// tens of radii away and gain nothing.
 const SITE_STRAYING: f64 = 0.01;
 
+/// Sites are offered so many places on the curve at most.
+const PLACES: usize = 500;
+
 /// Frames nearer than this part of a step are the same.
 const AGAIN: f64 = 0.01;
 
@@ -39,6 +42,14 @@ pub(super) fn firm(frames: usize) -> Round {
     Round {
         evaluations: (5000 / frames.max(1)).clamp(25, 60),
         bending: 0.025,
+    }
+}
+/// After an exchange of sites: what is not soon better than before will not be.
+pub(super) fn after_exchange(frames: usize) -> Round {
+    let round = firm(frames);
+    Round {
+        evaluations: round.evaluations / 2,
+        ..round
     }
 }
 /// While a pin is dragged.
@@ -188,6 +199,26 @@ impl Draft {
         let scale = (self.weights.len() as f64 / squares).sqrt();
         self.weights.iter_mut().for_each(|weight| *weight *= scale);
         self
+    }
+
+    /// The `count` sites that are missed least go to where on the curve they are wanted most.
+    pub(super) fn exchanged(self, samples: &Samples, curve: &Curve, count: usize) -> Self {
+        let points = curve.fitted.design().apply(self.controls.as_ref());
+        let places = curve.even_points(self.controls.as_ref(), points.nrows().min(PLACES));
+        let (points, targets) = (points.as_ref(), samples.dense.as_ref());
+        let (weights, sites) = (&self.weights, self.plate.sites.as_ref());
+        let places = places.as_ref();
+        let sites = variable_projection::exchange(points, targets, weights, sites, count, places);
+        let plate = variable_projection::fit_plate(points, targets, weights, sites.as_ref());
+        Draft { plate, ..self }
+    }
+
+    /// Squared residual at the fitted samples as refinement weighs it.
+    pub(super) fn missed(&self, samples: &Samples, curve: &Curve) -> f64 {
+        let missed = &samples.dense - self.value(curve.fitted.design());
+        let rows = self.weights.iter().enumerate();
+        let squares = rows.map(|(row, weight)| (weight * missed.row(row).norm_l2()).powi(2));
+        squares.sum()
     }
 
     /// g(f(t)) at the samples of a design.

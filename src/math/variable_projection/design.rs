@@ -11,11 +11,12 @@
 
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::householder;
+use faer::linalg::matmul::matmul;
 use faer::linalg::qr::no_pivoting::factor::{
     qr_in_place, qr_in_place_scratch, recommended_block_size,
 };
 use faer::linalg::triangular_solve::solve_upper_triangular_in_place;
-use faer::{Conj, Mat, MatMut, MatRef, Par};
+use faer::{Accum, Conj, Mat, MatMut, MatRef, Par};
 
 use super::Plate;
 
@@ -122,6 +123,23 @@ impl Design {
             }
         }
         self.reflectors.apply_left(&mut plate.weights);
+    }
+
+    /// V, l x l: the covariance of the last solve's coefficients w, up to a factor.
+    pub(super) fn covariance(&self) -> Mat<f64> {
+        let count = self.sites;
+        let mut inverse = Mat::identity(count, count);
+        let upper = self.factor.as_ref().subrows(0, count);
+        solve_upper_triangular_in_place(upper, inverse.as_mut(), Par::Seq);
+        let mut root = Mat::from_fn(count, count, |j, c| match j.checked_sub(3) {
+            Some(row) => inverse[(row, c)] / self.scale[row],
+            None => 0.0,
+        });
+        self.reflectors.apply_left(&mut root);
+        let (mut covariance, root) = (Mat::zeros(count, count), root.as_ref());
+        let to = covariance.as_mut();
+        matmul(to, Accum::Replace, root, root.transpose(), 1.0, Par::Seq);
+        covariance
     }
 
     /// Weighted residual of the last solve, written to the first N rows of `residual`, (N+l) x m; the rows

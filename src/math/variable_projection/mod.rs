@@ -11,6 +11,7 @@
 //! steps with Kaufman's Jacobian (1975), which is never formed (`normal`).
 
 mod design;
+mod exchange;
 mod normal;
 mod plate;
 mod step;
@@ -23,6 +24,7 @@ use self::step::Steps;
 use super::uniform_spline::UniformDesign;
 use crate::task::{Cancelled, Task};
 
+pub use exchange::exchange;
 pub use plate::Plate;
 
 /// What is to be met, and what holds the curve and the sites in place.

@@ -181,3 +181,104 @@ fn refinement_decreases_and_keeps_fixed_points() {
         assert!((after[(12, a)] - before[(12, a)]).abs() < 1e-10);
     }
 }
+
+/// Squared weighted residual of the plate of least squares over `sites`.
+fn missed(small: &Small, points: &Mat<f64>, sites: &Mat<f64>) -> f64 {
+    let (targets, weights) = (small.targets.as_ref(), &small.weights[..]);
+    let plate = fit_plate(points.as_ref(), targets, weights, sites.as_ref());
+    let left = &small.targets - plate.at(points.as_ref());
+    (0..left.nrows())
+        .map(|i| (weights[i] * left.row(i).norm_l2()).powi(2))
+        .sum()
+}
+
+#[test]
+fn the_exchanged_site_is_the_one_missed_least_and_comes_where_it_gains_most() {
+    let small = small();
+    let points = small.spline.apply(small.controls.as_ref());
+    let sites = &small.sites;
+    let count = sites.nrows();
+    let rows = |rows: Vec<[f64; 2]>| Mat::from_fn(rows.len(), 2, |j, a| rows[j][a]);
+    let place = |of: &Mat<f64>, j: usize| [of[(j, 0)], of[(j, 1)]];
+    let others = |gone: usize| -> Vec<[f64; 2]> {
+        let stay = (0..count).filter(|&j| j != gone);
+        stay.map(|j| place(sites, j)).collect()
+    };
+    // All that can be tried, tried.
+    let without = |gone: &usize| missed(&small, &points, &rows(others(*gone)));
+    let gone = (0..count)
+        .min_by(|a, b| without(a).total_cmp(&without(b)))
+        .unwrap();
+    let with = |i: usize| {
+        let mut all = others(gone);
+        all.push(place(&points, i));
+        missed(&small, &points, &rows(all))
+    };
+    let least = (0..points.nrows()).map(with).fold(f64::INFINITY, f64::min);
+    let moved = exchange(
+        points.as_ref(),
+        small.targets.as_ref(),
+        &small.weights,
+        sites.as_ref(),
+        1,
+        points.as_ref(),
+    );
+    for (j, stays) in others(gone).into_iter().enumerate() {
+        assert_eq!(place(&moved, j), stays);
+    }
+    // The same sums in another order, of a problem whose condition is some thousands.
+    let found = missed(&small, &points, &moved);
+    assert!((found / least - 1.0).abs() < 1e-8, "{found} {least}");
+}
+
+#[test]
+fn of_two_sites_in_one_place_one_goes_where_it_is_wanted() {
+    let small = small();
+    let points = small.spline.apply(small.controls.as_ref());
+    let plate = fit_plate(
+        points.as_ref(),
+        small.targets.as_ref(),
+        &small.weights,
+        small.sites.as_ref(),
+    );
+    let targets = plate.at(points.as_ref());
+    let mut crowded = small.sites.clone();
+    for a in 0..2 {
+        crowded[(2, a)] = crowded[(3, a)];
+    }
+    let moved = exchange(
+        points.as_ref(),
+        targets.as_ref(),
+        &small.weights,
+        crowded.as_ref(),
+        1,
+        small.sites.as_ref(),
+    );
+    let found = fit_plate(
+        points.as_ref(),
+        targets.as_ref(),
+        &small.weights,
+        moved.as_ref(),
+    );
+    let left = (&targets - found.at(points.as_ref())).norm_l2();
+    // The ridge of 1e-12 leaves its square root.
+    assert!(left < 1e-5 * targets.norm_l2(), "{left}");
+}
+
+#[test]
+fn four_sites_and_fewer_stay_and_so_do_sites_without_a_candidate() {
+    let small = small();
+    let points = small.spline.apply(small.controls.as_ref());
+    let with = |sites: MatRef<'_, f64>, candidates: MatRef<'_, f64>| {
+        let (points, targets) = (points.as_ref(), small.targets.as_ref());
+        exchange(points, targets, &small.weights, sites, 3, candidates)
+    };
+    let four = small.sites.as_ref().subrows(0, 4);
+    assert_eq!(with(four, points.as_ref()), four);
+    let sites = small.sites.as_ref();
+    let none = with(sites, sites.subrows(0, 0));
+    for j in 0..sites.nrows() {
+        let same = |i: usize| none.row(i) == sites.row(j);
+        assert!((0..sites.nrows()).any(same));
+    }
+}
