@@ -47,10 +47,10 @@ impl Embedding {
                     self.finisher.finish(&wanted, &mut path[at], &mut kept);
                 }
             }
-            if !even(&path) {
-                break;
+            // stiff springs may not have got far yet
+            if even(&path) {
+                found = Some(path[1..path.len() - 1].to_vec());
             }
-            found = Some(path[1..path.len() - 1].to_vec());
         }
         found
     }
