@@ -13,8 +13,8 @@ use meshloom::loom::fit::FitOptions;
 use meshloom::mesh::FrameSource;
 use meshloom::pipeline::plot::plot_loom;
 use meshloom::plot::{Anchor, PoseSpace, Scene, Theme, pose_space};
-
 use meshloom::task::Task;
+
 use support::{Figure, View, percent, table};
 
 /// How many frames the loop may have: about as many as the paper's adds.

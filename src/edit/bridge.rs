@@ -80,9 +80,10 @@ impl Term {
 }
 
 impl<'a> Way<'a> {
-    /// The way over `places` of `curve`, two for each frame (at even numbers the frame itself), whose control points from `first` on, `count`
-    /// of them, are free. `source` gives where the motion was at each place before, and on which side of
-    /// the seam; none where the place is new. Cancelling `task` ends the search.
+    /// The way over `places` of `curve`, two for each frame (at even numbers the frame itself), whose control
+    /// points from `first` on, `count` of them, are free. `source` gives where the motion was at each place
+    /// before, and on which side of the seam; none where the place is new. Cancelling `task` ends the
+    /// search.
     pub(super) fn new(
         (pose, clip, task): (&'a PoseSignal, &Clip, &'a Task),
         curve: &Curve,
@@ -158,8 +159,7 @@ impl<'a> Way<'a> {
         ways.sort_by(|a, b| a.0.total_cmp(&b.0));
         // Starts that lead to the same way lead on to the same.
         ways.dedup_by(|b, a| b.0 - a.0 <= 1e-3 * a.0);
-        for (_, way) in ways.into_iter().take(FOLLOWED) {
-            let mut way = way;
+        for (_, mut way) in ways.into_iter().take(FOLLOWED) {
             for power in &POWERS[1..] {
                 if way.largest() <= ENOUGH {
                     break;

@@ -109,7 +109,7 @@ impl Part<'_> {
 
 /// From corner 0 to corners 1 and 2.
 #[inline(always)]
-fn sides(triangle: &[u32; 3], positions: &[f64]) -> [Vector3<f64>; 2] {
+pub(super) fn sides(triangle: &[u32; 3], positions: &[f64]) -> [Vector3<f64>; 2] {
     let [a, b, c] = triangle.map(|vertex| triple(positions, vertex as usize));
     [b - a, c - a]
 }

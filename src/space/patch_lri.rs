@@ -11,7 +11,8 @@
 //! mean rotation is nearest the sum of the patches'. Parts are joined across edges: where two meet in
 //! a vertex only, each has a rotation of its own, as connected parts have.
 //!
-//! Degenerate input is treated as in [`super::Gradients`].
+//! Degenerate input is treated as in [`super::Gradients`]. Triangles that are torn between poses may be
+//! told ([`super::Spaces::open_weighted`]): they have the images of their plane instead.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -19,7 +20,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use super::gradients::{decode_stretch, encode_faces};
-use super::orientation::polar_factors;
+use super::orientation::{polar_factors, sides};
 use super::patching::{FinePatches, Patching};
 use super::placement::{Placement, blocks_from, follow_rotation, triple};
 use super::registry::State;
@@ -77,9 +78,8 @@ impl PatchLri {
 
     /// Where the sides of a triangle lead in a shape, beside the sides in the reference.
     fn images(&self, face: usize, positions: &[f64]) -> [Vector3<f64>; 2] {
-        let corners = self.poisson.analysis().triangles()[face];
-        let [a, b, c] = corners.map(|vertex| triple(positions, vertex as usize));
-        self.poisson.reference()[face].images(&(b - a), &(c - a))
+        let [e1, e2] = sides(&self.poisson.analysis().triangles()[face], positions);
+        self.poisson.reference()[face].images(&e1, &e2)
     }
 
     fn faces(&self) -> usize {
@@ -252,14 +252,14 @@ impl ShapeSpace for PatchLri {
         let (reference, patch) = (self.poisson.reference(), self.patching.of_triangles());
         self.poisson.solve(
             |face| {
-                let w = triple(coordinates, face) / (self.rotation * self.shares[face]);
                 let stretch = &coordinates[stretches + 6 * face..][..6];
                 let scale = 1.0 / (self.stretch * self.shares[face]);
+                let turn = turns[patch[face] as usize];
                 if self.torn.binary_search(&(face as u32)).is_ok() {
-                    let turn = turns[patch[face] as usize];
                     return [0, 1].map(|side| turn * (triple(stretch, side) * scale));
                 }
-                let turn = (turns[patch[face] as usize] * exp(&w)).to_rotation_matrix();
+                let w = triple(coordinates, face) / (self.rotation * self.shares[face]);
+                let turn = (turn * exp(&w)).to_rotation_matrix();
                 decode_stretch(&reference[face], stretch, scale).map(|image| turn * image)
             },
             positions,

@@ -364,6 +364,7 @@ impl Following {
         }
     }
 }
+
 /// By what a ghost's triangles count: as they are torn between its `shapes`, and as those of the mesh are that
 /// they are left of. Beside the longer sides of a ghost a tear is less, but it is where it was.
 fn torn_of_ghost(

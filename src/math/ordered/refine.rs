@@ -44,6 +44,7 @@ pub(super) fn firm(frames: usize) -> Round {
         bending: 0.025,
     }
 }
+
 /// After an exchange of sites: what is not soon better than before will not be.
 pub(super) fn after_exchange(frames: usize) -> Round {
     let round = firm(frames);
@@ -52,6 +53,7 @@ pub(super) fn after_exchange(frames: usize) -> Round {
         ..round
     }
 }
+
 /// While a pin is dragged.
 pub(super) const QUICK: Round = Round {
     evaluations: 2,

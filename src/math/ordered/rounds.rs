@@ -42,13 +42,17 @@ impl Rounds<'_> {
         let frames = self.samples.frames;
         let draft = draft.refined(self.samples, self.curve, self.pins, firm(frames), self.task)?;
         self.task.step();
+        let quality = draft.quality(self.samples, self.curve, self.floor);
         let mut best = Best {
-            excess: self.excess(&draft),
+            excess: quality.excess,
             left: (ROUNDS / (frames * frames)).clamp(FEW, MANY),
             draft,
         };
+        if !best.is_unfinished() {
+            return Ok(best.draft);
+        }
         let first = best.draft.clone();
-        if self.is_seen(&first) {
+        if quality.is_seen() {
             self.reweigh(first.clone(), &mut best)?;
         }
         let moved = self.exchange(first, &mut best)?;
@@ -102,13 +106,6 @@ impl Rounds<'_> {
     /// How many times a draft misses what is wanted.
     fn excess(&self, draft: &Draft) -> f64 {
         draft.quality(self.samples, self.curve, self.floor).excess
-    }
-
-    /// Whether it deviates visibly anywhere.
-    fn is_seen(&self, draft: &Draft) -> bool {
-        draft
-            .quality(self.samples, self.curve, self.floor)
-            .is_seen()
     }
 }
 
