@@ -1,5 +1,7 @@
 //! The way over a seam: control points that let the shapes change as evenly as the motion itself does.
 
+use rayon::prelude::*;
+
 use super::seam::Clip;
 use crate::diag::Result;
 use crate::math::b_spline::{Curve, Place, Point, basis};
@@ -62,6 +64,9 @@ const BEND: Kind = Kind {
     stride: 2,
     factors: &[1.0, -2.0, 1.0],
 };
+
+/// So many places are evaluated in a row by one thread at least.
+const MIN_PLACES: usize = 32;
 
 /// Places that meet in a term lie less than this apart.
 const APART: usize = 5;
@@ -148,11 +153,14 @@ impl<'a> Way<'a> {
             }
             shown
         };
-        let mut ways = Vec::new();
-        for start in starts {
+        let followed = starts.par_iter().map(|start| {
             let start = State::new(self, start.clone());
+            let squares = self.descend(start.clone(), POWERS[0])?;
+            Ok((start, squares))
+        });
+        let mut ways = Vec::new();
+        for (start, squares) in followed.collect::<Result<Vec<_>>>()? {
             keep(&start);
-            let squares = self.descend(start, POWERS[0])?;
             keep(&squares);
             ways.push((squares.energy(POWERS[0], 1.0), squares));
         }
@@ -393,10 +401,13 @@ impl State {
         let m = way.pose.modes();
         let mut x = vec![0.0; m * way.places.len()];
         let mut slopes = vec![0.0; 2 * x.len()];
-        let rows = x.chunks_mut(m.max(1)).zip(slopes.chunks_mut(2 * m.max(1)));
-        for ((place, _), (x, slopes)) in way.places.iter().zip(rows) {
+        let rows = x
+            .par_chunks_mut(m.max(1))
+            .zip(slopes.par_chunks_mut(2 * m.max(1)));
+        let places = way.places.par_iter().zip(rows).with_min_len(MIN_PLACES);
+        places.for_each(|((place, _), (x, slopes))| {
             way.pose.evaluate_with_jacobian(curve.at(*place), x, slopes);
-        }
+        });
         let mut rests = Vec::with_capacity(m * way.terms.len());
         for term in &way.terms {
             let from = rests.len();

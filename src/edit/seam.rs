@@ -57,6 +57,35 @@ impl Clip {
         Clip { states, sizes }
     }
 
+    /// How many frames before `from` and after `to`, at most `most`, the motion first moves and turns no more
+    /// than it does on the whole; where it does nowhere, where it does least.
+    pub(super) fn calm(&self, (from, to): (f64, f64), most: usize) -> (usize, usize) {
+        let (a, b) = (from.round() as usize - 1, to.round() as usize - 1);
+        let [steps, _, bends] = self.states.differences();
+        // What a frame and those beside it do.
+        let stir = |i: usize| {
+            let about = |all: &[Vec<f64>], from: usize, to: usize| {
+                let all = &all[from.min(all.len())..to.min(all.len())];
+                all.iter().map(|d| norm(d)).fold(0.0, f64::max)
+            };
+            let step = about(&steps, i.saturating_sub(1), i + 1);
+            let bend = about(&bends, i.saturating_sub(2), i + 1);
+            (step / self.sizes[0]).max(bend / self.sizes[2])
+        };
+        let first = |stirs: Vec<f64>| {
+            let least = stirs.iter().copied().fold(f64::INFINITY, f64::min);
+            stirs
+                .iter()
+                .position(|&stir| stir <= least.max(1.0))
+                .unwrap_or(0)
+        };
+        let last = self.frames() - 1;
+        (
+            first((0..=most.min(a)).map(|d| stir(a - d)).collect()),
+            first((0..=most.min(last - b)).map(|d| stir(b + d)).collect()),
+        )
+    }
+
     /// How many frames there are.
     pub(super) fn frames(&self) -> usize {
         self.states.x.len()
@@ -164,7 +193,23 @@ fn ratio(seam: f64, motion: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::edit::retime;
     use crate::loom::test_looms::ring;
+
+    #[test]
+    fn a_motion_is_calm_before_and_after_it_rushes() {
+        let keys = [[1.0, 1.0], [20.0, 10.0], [24.0, 40.0], [64.0, 60.0]];
+        let clip = Clip::of(&retime(&ring(10, 60, true), &keys).unwrap());
+        let (before, after) = clip.calm((22.0, 23.0), 12);
+        assert!(
+            (2..=12).contains(&before) && (1..=12).contains(&after),
+            "{before} {after}"
+        );
+        // never beyond the motion, nor further than allowed
+        assert_eq!(clip.calm((1.0, 64.0), 12), (0, 0));
+        let (before, after) = clip.calm((22.0, 23.0), 1);
+        assert!(before <= 1 && after <= 1);
+    }
 
     #[test]
     fn a_motion_against_itself_shows_nothing_within_it() {

@@ -10,19 +10,24 @@
 //! their bits. The spans next to a seam are cut into pieces of about a frame: what the motion does within
 //! a frame, a few control points over ten frames cannot meet. Where the ends lie apart, frames with
 //! a span each lead from one to the other.
+//!
+//! Some ends no bridge can leave or meet so: where the motion is fast, or turns at once. A seam that shows
+//! for all the time it is given may turn over more spans, and where that is not enough, the bridge may leave
+//! the motion later and come back to it earlier, where it is calm: an animal that is to be thrown again is
+//! led to the hand that throws it, not into its flight.
 
 mod cut;
 mod plan;
 mod root;
+mod search;
 
 use super::forward::forward;
 use super::seam::{Clip, Seam};
 use crate::diag::{Diagnostic, Result, Warned};
 use crate::loom::Loom;
-use crate::math::b_spline::Point;
 use crate::signal::time::TimeSignal;
 use crate::task::Task;
-use plan::Plan;
+use search::Search;
 
 /// Seams above this show.
 const SHOWS: f64 = 1.5;
@@ -38,6 +43,11 @@ pub struct Looped {
     pub moved: f64,
     /// Frames between two passes.
     pub bridge: usize,
+    /// How many of these are the motion's own: before the bridge leaves it, and after it has come back.
+    pub own: (usize, usize),
+    /// Frames (from 1) of the motion as it was: before a seam all up to the first of these keep their bits,
+    /// after it all from the second on; what is nearer to it turns into the bridge.
+    pub kept: (usize, usize),
     /// How much the first seam shows.
     pub seam: Seam,
 }
@@ -50,6 +60,19 @@ impl From<Looped> for Warned<Loom> {
             let (from, to) = looped.stretch;
             let message = format!("the loop goes from {from} to {to}: it takes whole frames");
             all.warnings.push(Diagnostic::warning(message));
+        }
+        let (out, back) = looped.own;
+        if out + back > 0 {
+            let (from, to) = looped.stretch;
+            let message = format!(
+                "the bridge leaves the motion at {} and comes back to it at {}, where it is calmer",
+                to + out as f64,
+                from - back as f64
+            );
+            all.warnings.push(
+                Diagnostic::warning(message)
+                    .hint("a loop with ends where the motion is calm needs a shorter bridge"),
+            );
         }
         let worst = looped.seam.worst();
         if worst > SHOWS {
@@ -67,9 +90,10 @@ impl From<Looped> for Warned<Loom> {
 /// The loom that passes `times` times more through \[`from`, `to`\]. `to` is moved so that the loop takes
 /// whole frames. `bridge` frames go between two passes; none given: as many as the distance between the
 /// ends takes at the speed there (none where they meet), and a quarter to a half more again and again until
-/// the seam does not show, at most two and a half times the loop (or 60), and not where three times
-/// the frames show no less. Frames outside the spans about a seam keep their bits; with root motion
-/// every pass adds the loop's increment.
+/// the seam does not show, at most two and a half times the loop (or 100), and not where three times
+/// the frames show no less. If it shows then, ever more spans beside it turn into the bridge; if that does
+/// not help, the bridge begins and ends with frames of the motion's own, up to a third of the longest on
+/// either side. Other frames keep their bits; with root motion every pass adds the loop's increment.
 ///
 /// # Errors
 /// The loop leaves \[1, n\], has no length or less than a frame; too many frames; time that runs back and
@@ -96,31 +120,26 @@ pub fn add_loop(
             .saturating_mul(times),
     )?;
     let clip = Clip::of(&forward.loom);
-    let attempt = |bridge: usize, known: Option<&[Point]>| {
-        Attempt::new((&forward.loom, &clip, task), (from, to), bridge, known)
+    let search = Search {
+        loom: &forward.loom,
+        clip: &clip,
+        task,
+        times,
     };
-    let mut best = attempt(wanted, None)?;
-    // A seam that shows is given more time.
-    let longest = most_bridged(length as usize);
-    let (mut last, mut shown) = (wanted, best.seam.worst());
-    while bridge.is_none() && times > 0 && best.seam.worst() > SHOWS {
-        let next = longer(last, shown).min(longest);
-        // Where so much more time shows no less, what is left is not the bridge's.
-        let most = (3 * best.plan.bridge).max(best.plan.bridge + 36);
-        if next <= last || next > most {
-            break;
-        }
-        let longer = attempt(next, Some(&best.eased))?;
-        (last, shown) = (next, longer.seam.worst());
-        if shown < best.seam.worst() {
-            best = longer;
-        }
-    }
+    let best = match bridge {
+        None if times > 0 => search.run((from, to))?,
+        _ => search.bridged((from, to), wanted)?,
+    };
     let looped = match times {
         1 => best.looped,
         times => best.plan.repeat(&forward.loom, times, &best.eased)?,
     };
+    let (own, kept) = (
+        best.plan.beyond((from, to)),
+        best.plan.kept(forward.loom.time()),
+    );
     let mirror = |t: f64| loom.frames() as f64 + 1.0 - t;
+    let counted = |frame: usize| loom.frames() + 1 - frame;
     Ok(Looped {
         loom: forward.restore(&looped)?,
         stretch: match forward.reversed {
@@ -128,55 +147,21 @@ pub fn add_loop(
             false => (from, to),
         },
         moved,
-        bridge: best.plan.bridge,
+        bridge: own.0 + best.plan.bridge + own.1,
+        own: match forward.reversed {
+            true => (own.1, own.0),
+            false => own,
+        },
+        kept: match forward.reversed {
+            true => (counted(kept.1), counted(kept.0)),
+            false => kept,
+        },
         seam: if times == 0 {
             Seam::default()
         } else {
             best.seam
         },
     })
-}
-
-/// Frames of the bridge to try after one that shows so much: accelerations fall as the square of the time.
-fn longer(frames: usize, shown: f64) -> usize {
-    let factor = (shown / SHOWS).sqrt().clamp(1.25, 1.5);
-    ((factor * frames as f64).ceil() as usize).max(frames + 1)
-}
-
-/// The longest bridge of a loop of so many frames.
-fn most_bridged(frames: usize) -> usize {
-    5 * frames.max(24) / 2
-}
-
-/// A pass more, on a loom without changes of time.
-struct Attempt {
-    plan: Plan,
-    /// The control points over a seam.
-    eased: Vec<Point>,
-    looped: Loom,
-    seam: Seam,
-}
-
-impl Attempt {
-    /// With that many frames over the seam.
-    fn new(
-        (loom, clip, task): (&Loom, &Clip, &Task),
-        (from, to): (f64, f64),
-        bridge: usize,
-        known: Option<&[Point]>,
-    ) -> Result<Self> {
-        let plan = Plan::new(loom, from, to, bridge)?;
-        let eased = plan.eased((loom, clip, task), known)?;
-        let looped = plan.repeat(loom, 1, &eased)?;
-        let last = to.floor() as usize;
-        let again = (last + bridge + 1, from.floor() as usize + 1);
-        Ok(Attempt {
-            seam: Seam::measure(clip, &looped, last, again),
-            plan,
-            eased,
-            looped,
-        })
-    }
 }
 
 /// Frames that the way from f(b) to f(a) takes: its length over the speed there.
@@ -226,9 +211,11 @@ mod tests {
                 // two spans are at most three frames and a half here
                 if frame < to - 4.0 {
                     assert_eq!(looped.loom.at(frame).unwrap(), before, "{frame}");
+                    assert!(frame <= looped.kept.0 as f64);
                 }
                 if frame > from + 4.0 {
                     assert_eq!(looped.loom.at(frame + shift).unwrap(), before, "{frame}");
+                    assert!(frame >= looped.kept.1 as f64);
                 }
             }
             assert_eq!(looped.loom.pose(), loom.pose());
@@ -269,6 +256,56 @@ mod tests {
         assert!(bridged.bridge > 2);
         assert!(bridged.seam.worst() < 0.5 * bare.seam.worst());
         assert_eq!(Warned::from(bare).warnings.len(), 1);
+    }
+
+    /// Half an old frame a new one, but for frames 20 to 24: there seven.
+    fn rushing() -> Loom {
+        let keys = [[1.0, 1.0], [20.0, 10.0], [24.0, 40.0], [64.0, 60.0]];
+        retime(&ring(10, 60, true), &keys).unwrap()
+    }
+
+    #[test]
+    fn a_bridge_leaves_and_meets_the_motion_where_it_is_calm() {
+        let loom = rushing();
+        let looped = add_loop(&loom, 22.0, 50.0, 1, None, &Task::default()).unwrap();
+        assert!(looped.seam.worst() <= SHOWS, "{:?}", looped.seam);
+        let (out, back) = looped.own;
+        assert!((1..12).contains(&back) && out + back < looped.bridge);
+        assert_eq!(looped.loom.frames(), 64 + 28 + looped.bridge);
+        // its own frames are the motion's, and so are those of the loop
+        assert!(looped.kept.1 <= 22 - back + 4);
+        for frame in looped.kept.1..=64 {
+            let there = (frame + looped.loom.frames() - 64) as f64;
+            assert_eq!(
+                looped.loom.at(there).unwrap(),
+                loom.at(frame as f64).unwrap()
+            );
+        }
+        let told = Warned::from(looped).warnings;
+        let place = format!("comes back to it at {}", 22 - back);
+        assert!(told[0].message.contains(&place), "{told:?}");
+    }
+
+    #[test]
+    fn a_bridge_of_so_many_frames_goes_where_it_was_asked_to() {
+        let looped = add_loop(&rushing(), 22.0, 50.0, 1, Some(9), &Task::default()).unwrap();
+        assert_eq!((looped.bridge, looped.own), (9, (0, 0)));
+        assert!(looped.seam.worst() > SHOWS);
+    }
+
+    #[test]
+    fn passes_are_alike() {
+        let loom = rushing();
+        for (from, to) in [(22.0, 50.0), (30.0, 33.0), (12.0, 40.0)] {
+            let looped = add_loop(&loom, from, to, 3, None, &Task::default()).unwrap();
+            let pass = (to - from) as usize + looped.bridge;
+            let at = |frame: usize| looped.loom.coordinates_at(frame as f64).unwrap();
+            for frame in from as usize + 1..from as usize + pass {
+                let pairs = at(frame + pass).into_iter().zip(at(frame + 2 * pass));
+                let apart = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                assert!(apart < 1e-9, "{from}..{to}: {frame} {apart}");
+            }
+        }
     }
 
     #[test]

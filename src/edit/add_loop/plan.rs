@@ -30,17 +30,24 @@ pub(super) struct Plan {
     /// point a frame: a seam is turned into within a frame or two.
     before: Vec<Place>,
     after: Vec<Place>,
-    /// How many spans more may change before the seam and after it: one where a knot was put, which changes
-    /// it by rounding anyway.
+    /// How many spans more may change before the seam and after it: those asked for, and one where a knot
+    /// was put, which changes it by rounding anyway.
     more: [usize; 2],
+    /// Those asked for.
+    wide: [usize; 2],
 }
 
 /// Spans that one span beside a seam is cut into, at most.
 const MOST_PIECES: usize = 12;
 
 impl Plan {
-    /// The plan with `bridge` frames between passes.
-    pub(super) fn new(loom: &Loom, from: f64, to: f64, bridge: usize) -> Result<Self> {
+    /// The plan with `bridge` frames between passes, and `wide` spans more before and after that may change.
+    pub(super) fn new(
+        loom: &Loom,
+        (from, to): (f64, f64),
+        bridge: usize,
+        wide: [usize; 2],
+    ) -> Result<Self> {
         let time = loom.time();
         let curve = time.curve();
         let ends = time.place_at(from).zip(time.place_at(to));
@@ -68,10 +75,11 @@ impl Plan {
             0 => Default::default(),
             frames => paced(frames, rates, (lead, rest)),
         };
-        let (before, after) = pieces(curve, (a, b), rates);
+        let (before, after) = pieces(curve, (a, b), rates, wide);
         let within =
             |place: Place| 0.0 < place.offset && place.offset < curve.span_length(place.span);
-        let more = [b, a].map(|end| usize::from(within(end) && b.span > a.span + 1));
+        let rounded = [b, a].map(|end| usize::from(within(end) && b.span > a.span + 1));
+        let more = [0, 1].map(|side| wide[side] + rounded[side]);
         Ok(Plan {
             from,
             to,
@@ -81,7 +89,25 @@ impl Plan {
             before,
             after,
             more,
+            wide,
         })
+    }
+
+    /// How many frames after `to` and before `from` the plan passes through beyond that loop.
+    pub(super) fn beyond(&self, (from, to): (f64, f64)) -> (usize, usize) {
+        let whole = |t: f64| t.round().max(0.0) as usize;
+        (whole(self.to - to), whole(from - self.from))
+    }
+
+    /// The frames (from 1) up to the first of which, and from the second on, all keep their bits.
+    pub(super) fn kept(&self, time: &TimeSignal) -> (usize, usize) {
+        // Two spans beside a seam change, and of those next to them the bits.
+        let (a, b) = (self.from, self.to);
+        let span = |t: f64| time.place_at(t).map_or(0, |(place, _)| place.span);
+        let before = |place: &&Place| place.span + 2 + self.wide[0] < span(b);
+        let upto = |place: &&Place| place.span <= span(a) + 2 + self.wide[1];
+        let count = |some: &dyn Fn(&&Place) -> bool| time.places().iter().take_while(some).count();
+        (count(&before), count(&upto) + 1)
     }
 
     /// The curve cut where the loop ends, where it begins, and (after that cut) where it ends.
@@ -152,11 +178,11 @@ impl Plan {
         assembled(loom, time, root)
     }
 
-    /// The control points over a seam that let it show least; `known` are those of a shorter bridge.
+    /// The control points over a seam that let it show least; `known` are those of another plan for it.
     pub(super) fn eased(
         &self,
         (loom, clip, task): (&Loom, &Clip, &Task),
-        known: Option<&[Point]>,
+        known: Option<(&Plan, &[Point])>,
     ) -> Result<Vec<Point>> {
         let [end, middle, start] = self.cuts(loom.time());
         let (left, right) = ((&end.curve, end.span), (&start.curve, start.span));
@@ -207,8 +233,15 @@ impl Plan {
             let straight = [place(b - 1), place(a - 1)];
             starts.push(way.laid(&exact, inner, &shapes.collect::<Vec<_>>()));
             starts.push(way.laid(&exact, inner, &straight));
-            if let Some(known) = known.and_then(|known| self.inner_of(known)) {
-                starts.push(way.laid(&exact, inner, known));
+            if let Some((plan, known)) = known {
+                let from = free + self.lead() - plan.lead();
+                if plan.bridge == self.bridge {
+                    let set =
+                        |curve: Curve, (j, at): (usize, &Point)| curve.with_control(from + j, *at);
+                    starts.push(known.iter().enumerate().fold(starts[0].clone(), set));
+                } else if let Some(known) = plan.inner_of(known) {
+                    starts.push(way.laid(&exact, inner, known));
+                }
             }
             starts.push(exact);
         }
@@ -317,9 +350,27 @@ fn paced(frames: usize, rates: [f64; 2], beside: (f64, f64)) -> (Vec<f64>, Vec<(
     (spans, places)
 }
 
-/// Knots in the span that ends at b and in the one that begins at a, so that each piece takes about a frame
-/// at these rates; none where these are one span.
-fn pieces(curve: &Curve, (a, b): (Place, Place), rates: [f64; 2]) -> (Vec<Place>, Vec<Place>) {
+/// How many spans more there are to change before a seam and after it, up to the ends of the motion; where
+/// there are more passes than one, half of the loop.
+pub(super) fn room(time: &TimeSignal, (from, to): (f64, f64), times: usize) -> [usize; 2] {
+    let span = |t: f64| time.place_at(t).map_or(0, |(place, _)| place.span);
+    let (a, b, all) = (span(from), span(to), time.curve().spans());
+    let most = match times {
+        1 => [b, all.saturating_sub(a + 1)],
+        _ => [b.saturating_sub(a + 1) / 2; 2],
+    };
+    // two spans more than these are changed
+    most.map(|spans| spans.saturating_sub(2))
+}
+
+/// Knots in the span that ends at b and in the one that begins at a, and in `wide` spans beyond, so that each
+/// piece takes about a frame at these rates; none where the ends are in one span.
+fn pieces(
+    curve: &Curve,
+    (a, b): (Place, Place),
+    rates: [f64; 2],
+    wide: [usize; 2],
+) -> (Vec<Place>, Vec<Place>) {
     let length = |span: usize| curve.span_length(span);
     let b = match b.span.checked_sub(1) {
         Some(span) if b.offset == 0.0 => Place {
@@ -338,7 +389,7 @@ fn pieces(curve: &Curve, (a, b): (Place, Place), rates: [f64; 2]) -> (Vec<Place>
     if a.span >= b.span {
         return (Vec::new(), Vec::new());
     }
-    let cut = |span: usize, from: f64, to: f64, rate: f64| {
+    let cut = |span: usize, (from, to): (f64, f64), rate: f64| -> Vec<Place> {
         let pieces = ((to - from) / rate).round().clamp(1.0, MOST_PIECES as f64);
         let knot = |i: usize| from + (to - from) * i as f64 / pieces;
         let place = |i: usize| Place {
@@ -347,9 +398,16 @@ fn pieces(curve: &Curve, (a, b): (Place, Place), rates: [f64; 2]) -> (Vec<Place>
         };
         (1..pieces as usize).map(place).collect()
     };
+    let whole = |span: usize, rate: f64| cut(span, (0.0, length(span)), rate);
+    let before = (b.span.saturating_sub(wide[0])..b.span).flat_map(|span| whole(span, rates[0]));
+    let after = (a.span + 1..=a.span + wide[1]).flat_map(|span| whole(span, rates[1]));
     (
-        cut(b.span, 0.0, b.offset, rates[0]),
-        cut(a.span, a.offset, length(a.span), rates[1]),
+        before
+            .chain(cut(b.span, (0.0, b.offset), rates[0]))
+            .collect(),
+        after
+            .chain(cut(a.span, (a.offset, length(a.span)), rates[1]))
+            .collect(),
     )
 }
 
@@ -413,7 +471,7 @@ mod tests {
         let place = |t: f64| time.place_at(t).unwrap().0;
         let (a, b) = (place(10.0), place(50.0));
         let rates = [time.slopes()[49], time.slopes()[9]];
-        let (before, after) = pieces(time.curve(), (a, b), rates.map(|rate| 0.25 * rate));
+        let (before, after) = pieces(time.curve(), (a, b), rates.map(|rate| 0.25 * rate), [0; 2]);
         assert!(!before.is_empty() && !after.is_empty());
         assert!(
             before
@@ -430,6 +488,9 @@ mod tests {
             offset: 0.5 * a.offset,
             ..a
         };
-        assert_eq!(pieces(time.curve(), (near, a), rates), (vec![], vec![]));
+        assert_eq!(
+            pieces(time.curve(), (near, a), rates, [0; 2]),
+            (vec![], vec![])
+        );
     }
 }
