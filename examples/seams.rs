@@ -2,8 +2,9 @@
 //!
 //! Loops of an eighth to three quarters of the motion are laid over it evenly and added as a recipe adds
 //! them, by `fit(input()).add_loop(a, b)`. The table gives for each the frames of the bridge, how many of them
-//! are the motion's own, how many frames before the seam and after it turn, the ratios of its seam (PEERS.md
-//! E.6), and how the motion accelerates by itself about the ends a and b.
+//! are the motion's own, how many frames before the seam and after it turn, how far out its shapes lie for 1 of
+//! the motion's farthest, the ratios of its seam (PEERS.md E.6), and how the motion accelerates by itself about
+//! the ends a and b.
 //!
 //! ```text
 //! cargo run --release --example seams [CAPTURE] [--out FOLDER]
@@ -23,8 +24,10 @@ use meshloom::signal::root::RootKind;
 use meshloom::task::Task;
 use support::{Figure, table};
 
-/// Seams above this show.
+/// Seams above this show, ..
 const SHOWS: f64 = 1.5;
+/// .. and shapes so many times as far out as the motion's look strange.
+const STRANGE: f64 = 1.75;
 
 fn main() -> ExitCode {
     support::run("seams", |figure| {
@@ -72,13 +75,14 @@ fn loops(frames: usize) -> Vec<(usize, usize)> {
 
 fn spread(figure: &mut Figure, name: &str, loom: &Loom) -> Result<()> {
     let mut rows = Vec::new();
-    let mut worst = 0.0_f64;
+    let (mut worst, mut strangest) = (0.0_f64, 0.0_f64);
     let mut shown = 0;
     let all = loops(loom.frames());
     for &(from, to) in &all {
         let began = std::time::Instant::now();
         let looped = add_loop(loom, from as f64, to as f64, 1, None, &Task::default())?;
         worst = worst.max(looped.seam.worst());
+        strangest = strangest.max(looped.strangeness);
         shown += usize::from(looped.seam.worst() > SHOWS);
         let mut row = row((from, to), &looped, began.elapsed().as_millis());
         row.extend(own(loom, from, to)?);
@@ -91,6 +95,7 @@ fn spread(figure: &mut Figure, name: &str, loom: &Loom) -> Result<()> {
             "bridge",
             "own",
             "turned",
+            "strange",
             "step",
             "velocity",
             "acceleration",
@@ -107,6 +112,9 @@ fn spread(figure: &mut Figure, name: &str, loom: &Loom) -> Result<()> {
         all.len()
     );
     figure.goal(&statement, shown == 0);
+    let statement =
+        format!("{name}: the strangest shape {strangest:.2} times as far out as the motion's");
+    figure.goal(&statement, strangest <= STRANGE);
     Ok(())
 }
 
@@ -122,6 +130,7 @@ fn row((from, to): (usize, usize), looped: &Looped, ms: u128) -> Vec<String> {
             (to + looped.own.0).saturating_sub(looped.kept.0),
             looped.kept.1.saturating_sub(from - looped.own.1 + 1)
         ),
+        format!("{:.2}", looped.strangeness),
         ratio(seam.step),
         ratio(seam.velocity),
         ratio(seam.acceleration),

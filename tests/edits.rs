@@ -290,6 +290,8 @@ fn small_moves_of_a_control_point_are_small_changes() {
 
 /// The seam of a loop is told apart from the motion by at most this (PEERS.md E.6).
 const SHOWS: f64 = 1.5;
+/// Shapes so many times as far out as those of the motion look strange.
+const STRANGE: f64 = 1.75;
 
 /// Loops of an eighth to three quarters of a motion of so many frames, laid over it evenly.
 fn loops(frames: usize) -> Vec<(usize, usize)> {
@@ -375,6 +377,8 @@ fn loops_show_no_seam() {
             let looped = looped(loom, (from, to), None);
             let seam = looped.seam;
             assert!(seam.worst() <= SHOWS, "{name} {from}..{to}: {seam:?}");
+            let strange = looped.strangeness;
+            assert!(strange <= STRANGE, "{name} {from}..{to}: {strange}");
             only_the_seam_changes(name, loom, &looped, (from, to));
         }
     }

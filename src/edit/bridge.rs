@@ -1,8 +1,10 @@
-//! The way over a seam: control points that let the shapes change as evenly as the motion itself does.
+//! The way over a seam: control points that let the shapes change as evenly as the motion itself does, and
+//! that keep to shapes like the motion's own.
 
 use rayon::prelude::*;
 
-use super::seam::Clip;
+use super::poses::{Poses, STRANGE};
+use super::seam::{Clip, SHOWS};
 use crate::diag::Result;
 use crate::math::b_spline::{Curve, Place, Point, basis};
 use crate::math::banded_cholesky::BandedSymmetric;
@@ -19,6 +21,10 @@ const POWERS: [i32; 4] = [2, 4, 8, 16];
 /// A way that shows this much of the motion's own changes at most is not bettered.
 const ENOUGH: f64 = 1.25;
 
+/// What it counts that a shape is as far out again as the farthest of the motion: one that looks strange counts
+/// as much as a seam that shows.
+const OUT: f64 = SHOWS / (STRANGE - 1.0);
+
 /// Of the ways with the least squares so many are followed on, the least first.
 const FOLLOWED: usize = 2;
 
@@ -26,6 +32,7 @@ const FOLLOWED: usize = 2;
 /// moved.
 pub(super) struct Way<'a> {
     pose: &'a PoseSignal,
+    poses: &'a Poses,
     task: &'a Task,
     /// Span and weights of the four control points of each place.
     places: Vec<(Place, [f64; 4])>,
@@ -90,7 +97,7 @@ impl<'a> Way<'a> {
     /// before, and on which side of the seam; none where the place is new. Cancelling `task` ends the
     /// search.
     pub(super) fn new(
-        (pose, clip, task): (&'a PoseSignal, &Clip, &'a Task),
+        (pose, clip, task): (&'a PoseSignal, &'a Clip, &'a Task),
         curve: &Curve,
         places: &[Place],
         source: &[Option<(bool, Point)>],
@@ -131,6 +138,7 @@ impl<'a> Way<'a> {
         let weighed = |&place: &Place| (place, basis(curve.around(place.span), place.offset));
         Way {
             pose,
+            poses: clip.poses(),
             task,
             places: places.iter().map(weighed).collect(),
             terms,
@@ -272,6 +280,16 @@ impl<'a> Way<'a> {
                 }
             }
         }
+        for (place, (size, slope)) in state.strange.iter().enumerate() {
+            if *size == 0.0 {
+                continue;
+            }
+            let weight = (size / top).powi(power - 2);
+            (0..2).for_each(|axis| pulls[place][axis] -= weight * size * slope[axis]);
+            for (i, entry) in pairs[place][0].entries.iter_mut().enumerate() {
+                *entry += f64::from(power - 1) * weight * slope[i / 2] * slope[i % 2];
+            }
+        }
         let mut matrix = BandedSymmetric::new(2 * self.count, 2 * self.reach());
         let mut right = vec![0.0; 2 * self.count];
         for (place, pull) in pulls.iter().enumerate() {
@@ -279,7 +297,7 @@ impl<'a> Way<'a> {
                 (0..2).for_each(|axis| right[2 * c + axis] += w * pull[axis]);
             }
             for (apart, pair) in pairs[place].iter().enumerate() {
-                if pair.common == 0.0 || self.free(place).next().is_none() {
+                if pair.is_none() || self.free(place).next().is_none() {
                     continue;
                 }
                 let (a, b) = (state.slopes(place, m), state.slopes(place + apart, m));
@@ -336,37 +354,10 @@ struct Pair {
     entries: [f64; 4],
 }
 
-/// Frames (from 0) of the motion that lead from one to another, both among them, in steps whose squares
-/// are least in all: where shapes of the motion lie between them, through these.
-pub(super) fn through(clip: &Clip, from: usize, to: usize) -> Vec<usize> {
-    let n = clip.frames();
-    let mut cost = vec![f64::INFINITY; n];
-    let mut before = vec![from; n];
-    let mut open = vec![true; n];
-    cost[from] = 0.0;
-    // Dijkstra's algorithm on all pairs
-    while let Some(here) = (0..n)
-        .filter(|&i| open[i] && cost[i].is_finite())
-        .min_by(|&a, &b| cost[a].total_cmp(&cost[b]))
-    {
-        open[here] = false;
-        if here == to {
-            break;
-        }
-        for next in (0..n).filter(|&i| open[i]) {
-            let apart = clip.apart(here, next);
-            if cost[here] + apart < cost[next] {
-                cost[next] = cost[here] + apart;
-                before[next] = here;
-            }
-        }
+impl Pair {
+    fn is_none(&self) -> bool {
+        self.common == 0.0 && self.entries == [0.0; 4]
     }
-    let mut way = vec![to];
-    while let Some(&last) = way.last().filter(|&&last| last != from) {
-        way.push(before[last]);
-    }
-    way.reverse();
-    way
 }
 
 /// The difference in the motion as it was, where all its shapes are known on one side of the seam.
@@ -394,6 +385,9 @@ struct State {
     slopes: Vec<f64>,
     rests: Vec<f64>,
     sizes: Vec<f64>,
+    /// What it counts that shapes lie farther out than the motion's, for each place, and its derivatives along
+    /// both axes of the map.
+    strange: Vec<(f64, Point)>,
 }
 
 impl State {
@@ -421,8 +415,17 @@ impl State {
             }
         }
         let sizes = rests.chunks(m.max(1)).map(|rest| dot(rest, rest).sqrt());
+        let mut along = vec![0.0; m];
+        let rows = x.chunks(m.max(1)).zip(slopes.chunks(2 * m.max(1)));
+        let strange = rows.map(|(x, slopes)| {
+            let strangeness = way.poses.strangeness_with_gradient(x, &mut along);
+            let count = OUT * (strangeness - 1.0).max(0.0);
+            let (first, second) = slopes.split_at(m);
+            (count, [first, second].map(|row| OUT * dot(row, &along)))
+        });
         State {
             sizes: sizes.collect(),
+            strange: strange.collect(),
             curve,
             slopes,
             rests,
@@ -442,12 +445,17 @@ impl State {
     }
 
     fn largest(&self) -> f64 {
-        self.sizes.iter().copied().fold(0.0, f64::max)
+        self.shown().fold(0.0, f64::max)
+    }
+
+    fn shown(&self) -> impl Iterator<Item = f64> + '_ {
+        let strange = self.strange.iter().map(|(count, _)| *count);
+        self.sizes.iter().copied().chain(strange)
     }
 
     /// The sum of a power of the norms, `top` being 1.
     fn energy(&self, power: i32, top: f64) -> f64 {
-        self.sizes.iter().map(|size| (size / top).powi(power)).sum()
+        self.shown().map(|size| (size / top).powi(power)).sum()
     }
 }
 
@@ -475,20 +483,6 @@ mod tests {
         assert!(largest(&evened) < ENOUGH.max(1.05 * largest(curve)));
         for (j, (a, b)) in evened.controls().iter().zip(rough.controls()).enumerate() {
             assert!((8..13).contains(&j) || a == b);
-        }
-    }
-
-    #[test]
-    fn a_way_leads_through_the_shapes_between() {
-        // one turn of the ring takes 20.27 frames: the way from its end to its beginning is short
-        let clip = Clip::of(&ring(10, 20, true));
-        assert_eq!(through(&clip, 3, 7), [3, 4, 5, 6, 7]);
-        assert_eq!(through(&clip, 7, 7), [7]);
-        let cost = |way: &[usize]| -> f64 { way.windows(2).map(|w| clip.apart(w[0], w[1])).sum() };
-        let way = through(&clip, 18, 1);
-        assert_eq!((way.first(), way.last()), (Some(&18), Some(&1)));
-        for other in [&[18, 1][..], &[18, 19, 1], &[18, 19, 0, 1]] {
-            assert!(cost(&way) <= cost(other), "{way:?} {other:?}");
         }
     }
 

@@ -14,6 +14,7 @@ mod hold;
 mod insert_control;
 mod move_control;
 mod path;
+mod poses;
 mod retime;
 mod reverse;
 mod seam;

@@ -1,5 +1,6 @@
 //! How much a seam shows: steps, changes of speed and accelerations there beside those of the whole motion.
 
+use super::poses::Poses;
 use crate::loom::Loom;
 
 /// Ratios of the seam to the motion (PEERS.md E.6), in the shape subspace (rigid motion apart), at whole
@@ -18,11 +19,15 @@ pub struct Seam {
     pub acceleration: f64,
 }
 
+/// Seams above this show.
+pub(super) const SHOWS: f64 = 1.5;
+
 /// A motion at its frames, and what its seams are measured with.
 pub(super) struct Clip {
     states: States,
     /// Mean step, largest change of velocity and median second difference.
     sizes: [f64; 3],
+    poses: Poses,
 }
 
 /// For each frame the coordinates in the shape subspace and their derivative.
@@ -54,7 +59,17 @@ impl Clip {
         let states = States::of(loom);
         let [steps, jumps, bends] = states.differences().map(|all| norms(&all));
         let sizes = [mean(&steps), most(&jumps), median(bends)];
-        Clip { states, sizes }
+        let poses = Poses::of(&states.x);
+        Clip {
+            states,
+            sizes,
+            poses,
+        }
+    }
+
+    /// Where its shapes lie.
+    pub(super) fn poses(&self) -> &Poses {
+        &self.poses
     }
 
     /// How many frames before `from` and after `to`, at most `most`, the motion first moves and turns no more
@@ -89,12 +104,6 @@ impl Clip {
     /// How many frames there are.
     pub(super) fn frames(&self) -> usize {
         self.states.x.len()
-    }
-
-    /// The squared distance of two frames, from 0.
-    pub(super) fn apart(&self, a: usize, b: usize) -> f64 {
-        let (a, b) = (&self.states.x[a], &self.states.x[b]);
-        a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
     }
 
     /// The mean step.

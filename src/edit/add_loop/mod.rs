@@ -11,26 +11,30 @@
 //! a frame, a few control points over ten frames cannot meet. Where the ends lie apart, frames with
 //! a span each lead from one to the other.
 //!
+//! Between the strands of its curve a map may hold anything: a bridge that was only smooth led a gallop through
+//! hooves as big as its trunk. So it keeps to shapes that lie hardly farther out than the motion's own, and
+//! begins with the shortest way over the map through such.
+//!
 //! Some ends no bridge can leave or meet so: where the motion is fast, or turns at once. A seam that shows
 //! for all the time it is given may turn over more spans, and where that is not enough, the bridge may leave
 //! the motion later and come back to it earlier, where it is calm: an animal that is to be thrown again is
 //! led to the hand that throws it, not into its flight.
 
 mod cut;
+mod passage;
 mod plan;
 mod root;
 mod search;
 
 use super::forward::forward;
-use super::seam::{Clip, Seam};
+use super::poses::STRANGE;
+use super::seam::{Clip, SHOWS, Seam};
 use crate::diag::{Diagnostic, Result, Warned};
 use crate::loom::Loom;
 use crate::signal::time::TimeSignal;
 use crate::task::Task;
+use passage::Motion;
 use search::Search;
-
-/// Seams above this show.
-const SHOWS: f64 = 1.5;
 
 /// A loom with a loop more, and what was done.
 #[derive(Clone)]
@@ -50,6 +54,9 @@ pub struct Looped {
     pub kept: (usize, usize),
     /// How much the first seam shows.
     pub seam: Seam,
+    /// How far from the mean shape the bridge goes at its frames, for 1 of the motion's farthest frame; each
+    /// mode is measured by its own deviation. Above 1.75 shapes begin to look strange.
+    pub strangeness: f64,
 }
 
 impl From<Looped> for Warned<Loom> {
@@ -74,6 +81,16 @@ impl From<Looped> for Warned<Loom> {
                     .hint("a loop with ends where the motion is calm needs a shorter bridge"),
             );
         }
+        if looped.strangeness > STRANGE {
+            let message = format!(
+                "the bridge's shapes lie up to {:.1} times as far out as the motion's own",
+                looped.strangeness
+            );
+            all.warnings.push(
+                Diagnostic::warning(message)
+                    .hint("a longer bridge, or ends where the poses are alike, need none such"),
+            );
+        }
         let worst = looped.seam.worst();
         if worst > SHOWS {
             let message =
@@ -90,10 +107,11 @@ impl From<Looped> for Warned<Loom> {
 /// The loom that passes `times` times more through \[`from`, `to`\]. `to` is moved so that the loop takes
 /// whole frames. `bridge` frames go between two passes; none given: as many as the distance between the
 /// ends takes at the speed there (none where they meet), and a quarter to a half more again and again until
-/// the seam does not show, at most two and a half times the loop (or 100), and not where three times
-/// the frames show no less. If it shows then, ever more spans beside it turn into the bridge; if that does
-/// not help, the bridge begins and ends with frames of the motion's own, up to a third of the longest on
-/// either side. Other frames keep their bits; with root motion every pass adds the loop's increment.
+/// the seam does not show and its shapes are not strange, at most two and a half times the loop (or 125),
+/// and not where more shows no less. If it shows then, ever more spans beside it turn into the bridge; if
+/// that does not help, the bridge begins and ends with frames of the motion's own, up to a third of the
+/// longest on either side. Other frames keep their bits; with root motion every pass adds the loop's
+/// increment.
 ///
 /// # Errors
 /// The loop leaves \[1, n\], has no length or less than a frame; too many frames; time that runs back and
@@ -121,9 +139,7 @@ pub fn add_loop(
     )?;
     let clip = Clip::of(&forward.loom);
     let search = Search {
-        loom: &forward.loom,
-        clip: &clip,
-        task,
+        motion: Motion::new(&forward.loom, &clip, task),
         times,
     };
     let best = match bridge {
@@ -156,6 +172,7 @@ pub fn add_loop(
             true => (counted(kept.1), counted(kept.0)),
             false => kept,
         },
+        strangeness: best.strangeness,
         seam: if times == 0 {
             Seam::default()
         } else {

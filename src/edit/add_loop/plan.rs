@@ -1,17 +1,16 @@
 //! The longer curve of a loop and its frames: which parts are repeated, and what goes over a seam.
 
 use crate::diag::{Diagnostic, Result};
-use crate::edit::bridge::{Way, through};
+use crate::edit::bridge::Way;
 use crate::edit::forward::assembled;
-use crate::edit::seam::Clip;
 use crate::loom::Loom;
 use crate::math::b_spline::{Curve, Place, Point};
 use crate::math::curve_join::{join, join_exactly};
 use crate::math::monotone;
 use crate::signal::time::TimeSignal;
-use crate::task::Task;
 
 use super::cut::Cut;
+use super::passage::Motion;
 use super::root;
 
 /// A bridge goes on at this part of the loop's mean rate at least, where its ends rest.
@@ -181,9 +180,10 @@ impl Plan {
     /// The control points over a seam that let it show least; `known` are those of another plan for it.
     pub(super) fn eased(
         &self,
-        (loom, clip, task): (&Loom, &Clip, &Task),
+        motion: &Motion<'_>,
         known: Option<(&Plan, &[Point])>,
     ) -> Result<Vec<Point>> {
+        let loom = motion.loom;
         let [end, middle, start] = self.cuts(loom.time());
         let (left, right) = ((&end.curve, end.span), (&start.curve, start.span));
         let joined = join(left, right, &self.spans).ok_or_else(unjoined)?;
@@ -217,7 +217,7 @@ impl Plan {
         let source: Vec<_> = places.iter().map(source).collect();
         let (free, count) = (self.first(&end), self.count());
         let way = Way::new(
-            (loom.pose(), clip, task),
+            (loom.pose(), motion.clip, motion.task),
             &joined,
             &places,
             &source,
@@ -226,13 +226,12 @@ impl Plan {
         let mut starts = vec![joined];
         if let Some(exact) = join_exactly(left, right, &self.spans) {
             // The first and last control points of the bridge hold what was there.
-            let inner = (self.lead() + 2, self.spans.len() - 3);
-            let (a, b) = (self.from.round() as usize, self.to.round() as usize);
-            let place = |frame: usize| loom.time().at((frame + 1) as f64).unwrap_or_default();
-            let shapes = through(clip, b - 1, a - 1).into_iter().map(place);
-            let straight = [place(b - 1), place(a - 1)];
-            starts.push(way.laid(&exact, inner, &shapes.collect::<Vec<_>>()));
-            starts.push(way.laid(&exact, inner, &straight));
+            let inner = (self.lead() + 2, self.spans.len().saturating_sub(3));
+            if inner.1 > 0 {
+                let points = motion.passage(self.to, self.from).points;
+                starts.push(way.laid(&exact, inner, &points));
+                starts.push(way.laid(&exact, inner, &[points[0], points[points.len() - 1]]));
+            }
             if let Some((plan, known)) = known {
                 let from = free + self.lead() - plan.lead();
                 if plan.bridge == self.bridge {

@@ -1,22 +1,23 @@
 //! Which bridge: the first that does not show, of those that take more and more time, change more of the
 //! motion beside the seam, or begin and end where the motion is calmer.
 
+use super::bridge_for;
+use super::passage::Motion;
 use super::plan::{Plan, room};
-use super::{SHOWS, bridge_for};
 use crate::diag::Result;
-use crate::edit::seam::{Clip, Seam};
+use crate::edit::poses::STRANGE;
+use crate::edit::seam::{SHOWS, Seam};
 use crate::loom::Loom;
 use crate::math::b_spline::Point;
-use crate::task::Task;
 
-/// More spans that change are tried while they take off this part of what shows at least.
-const HELPS: f64 = 0.05;
+/// What leaves more than this of what showed before does not help; ..
+const HELPS: f64 = 0.97;
+/// .. and so many longer bridges one after the other that do not are the last.
+const IDLE: usize = 3;
 
-/// A loom without changes of time, and how often the loop is passed through again.
+/// A motion, and how often the loop is passed through again.
 pub(super) struct Search<'a> {
-    pub(super) loom: &'a Loom,
-    pub(super) clip: &'a Clip,
-    pub(super) task: &'a Task,
+    pub(super) motion: Motion<'a>,
     pub(super) times: usize,
 }
 
@@ -27,6 +28,8 @@ pub(super) struct Attempt {
     pub(super) eased: Vec<Point>,
     pub(super) looped: Loom,
     pub(super) seam: Seam,
+    /// How far out the farthest shape of the bridge is, for 1 of the motion's own.
+    pub(super) strangeness: f64,
 }
 
 impl Search<'_> {
@@ -37,13 +40,13 @@ impl Search<'_> {
         if !asked.shows() {
             return Ok(asked);
         }
-        let (before, after) = self.clip.calm((from, to), longest / 3);
+        let (before, after) = self.motion.clip.calm((from, to), longest / 3);
         if before + after == 0 {
             return Ok(asked);
         }
         let ends = (from - before as f64, to + after as f64);
-        let calmer = self.between(ends, longest - before - after)?;
-        let better = calmer.seam.worst() < asked.seam.worst();
+        let calmer = self.between(ends, longest)?;
+        let better = calmer.shown() < asked.shown();
         Ok(if better { calmer } else { asked })
     }
 
@@ -56,8 +59,8 @@ impl Search<'_> {
     /// The best found between these ends: a seam that shows is given more time, at most `longest` frames, and
     /// then more of the motion beside it.
     fn between(&self, ends: (f64, f64), longest: usize) -> Result<Attempt> {
-        let room = room(self.loom.time(), ends, self.times);
-        let wanted = bridge_for(self.loom.time(), ends.0, ends.1).min(longest);
+        let room = room(self.motion.loom.time(), ends, self.times);
+        let wanted = bridge_for(self.motion.loom.time(), ends.0, ends.1).min(longest);
         let mut best = self.bridged(ends, wanted)?;
         let (mut last, mut wide) = (wanted, [0; 2]);
         for doubled in 1.. {
@@ -68,8 +71,8 @@ impl Search<'_> {
             }
             (last, wide) = (best.plan.bridge, wider);
             let next = self.attempt(ends, (last, wide), Some(&best))?;
-            let helps = next.seam.worst() < (1.0 - HELPS) * best.seam.worst();
-            if next.seam.worst() < best.seam.worst() {
+            let helps = next.shown() < HELPS * best.shown();
+            if next.shown() < best.shown() {
                 best = next;
             }
             if !helps {
@@ -87,21 +90,37 @@ impl Search<'_> {
         (mut last, wide): (usize, [usize; 2]),
         longest: usize,
     ) -> Result<Attempt> {
-        let mut shown = best.seam.worst();
-        while best.shows() {
-            let next = longer(last, shown).min(longest);
-            // Where so much more time shows no less, what is left is not the bridge's.
-            let most = (3 * best.plan.bridge).max(best.plan.bridge + 36);
-            if next <= last || next > most {
+        let least = if best.shows() { self.least(ends) } else { 0 };
+        let (mut shown, mut idle) = (best.shown(), 0);
+        // Where more time and more again show no less, what is left is not the bridge's.
+        while best.shows() && idle < IDLE {
+            let next = longer(last, shown).max(least).min(longest);
+            if next <= last {
                 break;
             }
             let longer = self.attempt(ends, (next, wide), Some(&best))?;
-            (last, shown) = (next, longer.seam.worst());
-            if shown < best.seam.worst() {
+            (last, shown) = (next, longer.shown());
+            idle = if shown < HELPS * best.shown() {
+                0
+            } else {
+                idle + 1
+            };
+            if shown < best.shown() {
                 best = longer;
             }
         }
         Ok(best)
+    }
+
+    /// Frames that the way over the map from end to end takes at least in steps that do not show.
+    fn least(&self, (from, to): (f64, f64)) -> usize {
+        let step = SHOWS * self.motion.clip.step();
+        let length = self.motion.passage(to, from).length;
+        if step > 0.0 {
+            (length / step) as usize
+        } else {
+            0
+        }
     }
 
     /// A pass with so many frames over the seam, and spans more on either side that may change.
@@ -112,13 +131,17 @@ impl Search<'_> {
         known: Option<&Attempt>,
     ) -> Result<Attempt> {
         let known = known.map(|known| (&known.plan, known.eased.as_slice()));
-        let plan = Plan::new(self.loom, (from, to), bridge, wide)?;
-        let eased = plan.eased((self.loom, self.clip, self.task), known)?;
-        let looped = plan.repeat(self.loom, 1, &eased)?;
+        let plan = Plan::new(self.motion.loom, (from, to), bridge, wide)?;
+        let eased = plan.eased(&self.motion, known)?;
+        let looped = plan.repeat(self.motion.loom, 1, &eased)?;
         let last = to.floor() as usize;
         let again = (last + bridge + 1, from.floor() as usize + 1);
         Ok(Attempt {
-            seam: Seam::measure(self.clip, &looped, last, again),
+            seam: Seam::measure(self.motion.clip, &looped, last, again),
+            strangeness: (last + 1..again.0)
+                .filter_map(|frame| looped.coordinates_at(frame as f64).ok())
+                .map(|x| self.motion.clip.poses().strangeness(&x))
+                .fold(0.0, f64::max),
             plan,
             eased,
             looped,
@@ -128,7 +151,12 @@ impl Search<'_> {
 
 impl Attempt {
     fn shows(&self) -> bool {
-        self.seam.worst() > SHOWS
+        self.shown() > SHOWS
+    }
+
+    /// How much the seam shows, or how strange the shapes are that lead over it, on one scale.
+    fn shown(&self) -> f64 {
+        self.seam.worst().max(SHOWS * self.strangeness / STRANGE)
     }
 }
 
@@ -140,5 +168,5 @@ fn longer(frames: usize, shown: f64) -> usize {
 
 /// The longest bridge of a loop of so many frames.
 fn most_bridged(frames: usize) -> usize {
-    5 * frames.max(40) / 2
+    5 * frames.max(50) / 2
 }

@@ -72,9 +72,9 @@ mod functions {
     /// a and b are times in frames; b is moved so that the loop takes whole frames (a warning tells where
     /// to), and knots are put at both. n grows by the frames inside and the bridges. Where the ends lie apart,
     /// `bridge` frames go between two passes (default: the distance over the local speed, and more until
-    /// the seam does not show; 0: none). Frames more than three spans from a seam keep their bits; where no
-    /// bridge meets the motion so, the default turns more of it, or leaves it later and comes back earlier, where
-    /// it is calm, which a warning tells.
+    /// the seam does not show and its shapes are like the motion's own; 0: none). Frames more than three spans
+    /// from a seam keep their bits; where no bridge meets the motion so, the default turns more of it, or
+    /// leaves it later and comes back earlier, where it is calm, which a warning tells.
     ///
     /// ```rhai
     /// let walk = fit(demo("gallop"), #{ tolerance: 0.05 });
