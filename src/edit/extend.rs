@@ -2,6 +2,7 @@
 
 use super::add_loop::{add_loop, bridge_for};
 use super::forward::{assembled, forward};
+use super::poses::{Poses, STRANGE};
 use super::trim::trim;
 use crate::diag::{Diagnostic, Result, Warned};
 use crate::loom::Loom;
@@ -13,7 +14,7 @@ use crate::task::Task;
 
 /// The loom with `frames` frames more: around the loop again where the end meets the start (a step or
 /// less apart, moving on the same way), else on along the last speed. All former frames keep their bits,
-/// but for the three spans at a seam.
+/// but for the three spans at a seam. A warning names the first frame whose shape looks strange.
 ///
 /// # Errors
 /// Too many frames; time that runs back and forth; the task was cancelled.
@@ -40,7 +41,29 @@ pub fn extend(loom: &Loom, frames: usize, task: &Task) -> Result<Warned<Loom>> {
     {
         return super::hold(loom, last, frames).map(Warned::clean);
     }
-    onward(loom, frames).map(Warned::clean)
+    let output = onward(loom, frames)?;
+    let warnings = strange(loom, &output)?.into_iter().collect();
+    Ok(Warned { output, warnings })
+}
+
+/// What is to be told where the motion goes on through shapes that look strange: the map ends with its curve.
+fn strange(before: &Loom, after: &Loom) -> Result<Option<Diagnostic>> {
+    let n = before.frames();
+    let known = (1..=n).map(|frame| before.coordinates_at(frame as f64));
+    let poses = Poses::of(&known.collect::<Result<Vec<_>>>()?);
+    for frame in n + 1..=after.frames() {
+        let out = poses.strangeness(&after.coordinates_at(frame as f64)?);
+        if out > STRANGE {
+            let message =
+                format!("from here on shapes lie {out:.1} times as far out as the motion's own");
+            return Ok(Some(
+                Diagnostic::warning(message)
+                    .at_frame(frame)
+                    .hint("`add_loop` goes on through shapes that are known"),
+            ));
+        }
+    }
+    Ok(None)
 }
 
 /// Whether the signal closes: the end about a step from the start, in about the same direction.
@@ -185,6 +208,19 @@ mod tests {
             let w = [n + 6, n + 11].map(|t| longer.time().velocity(t as f64).unwrap());
             assert!((0..2).all(|k| (w[0][k] - w[1][k]).abs() < 1e-12));
         }
+    }
+
+    #[test]
+    fn shapes_beyond_the_map_are_told() {
+        let loom = ring(10, 31, true);
+        let told = |frames| extend(&loom, frames, &Task::default()).unwrap().warnings;
+        assert_eq!(told(1), []);
+        let far = told(60);
+        let frame = far[0].place.frame.unwrap();
+        assert!((33..91).contains(&frame) && far[0].message.contains("as far out"));
+        // up to there all is well, and with so many frames more the same is told
+        assert_eq!(told(frame - 32), []);
+        assert_eq!(told(frame - 31), far);
     }
 
     #[test]

@@ -151,6 +151,8 @@ mod functions {
 
     /// Continues past the end: along the last speed, or around the loop if the ends meet.
     ///
+    /// The map ends with its curve: a warning names the frame from which shapes look strange.
+    ///
     /// `loom.extend(frames)`
     ///
     /// ```rhai
