@@ -7,6 +7,7 @@ use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
+use crate::diag::Result;
 use crate::edit::seam::Clip;
 use crate::loom::Loom;
 use crate::math::b_spline::Point;
@@ -39,14 +40,22 @@ impl<'a> Motion<'a> {
     }
 
     /// The cheapest way from one time to another, which are those of frames or rounded to them.
-    pub(super) fn passage(&self, from: f64, to: f64) -> Passage {
+    ///
+    /// # Errors
+    /// The task was cancelled.
+    pub(super) fn passage(&self, from: f64, to: f64) -> Result<Passage> {
         let (pose, time) = (self.loom.pose(), self.loom.time());
-        let passages = self.passages.get_or_init(|| {
-            let at = |frame: usize| time.at(frame as f64).unwrap_or_default();
-            Passages::new(pose, self.clip, (1..=self.loom.frames()).map(at).collect())
-        });
+        let passages = match self.passages.get() {
+            Some(known) => known,
+            None => {
+                let at = |frame: usize| time.at(frame as f64).unwrap_or_default();
+                let places = (1..=self.loom.frames()).map(at).collect();
+                let found = Passages::new(pose, self.clip, places, self.task)?;
+                self.passages.get_or_init(|| found)
+            }
+        };
         let frame = |t: f64| (t.round() as usize).clamp(1, self.loom.frames()) - 1;
-        passages.way((pose, self.clip), frame(from), frame(to))
+        Ok(passages.way((pose, self.clip), frame(from), frame(to)))
     }
 }
 
@@ -67,26 +76,27 @@ pub(super) struct Passage {
 
 impl Passages {
     /// Those of a motion whose frames lie at `places`.
-    fn new(pose: &PoseSignal, clip: &Clip, places: Vec<Point>) -> Self {
+    fn new(pose: &PoseSignal, clip: &Clip, places: Vec<Point>, task: &Task) -> Result<Self> {
         let n = places.len();
         let squared = |a: Point, b: Point| (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2);
         let found = (0..n).into_par_iter().map(|i| {
+            task.check()?;
             let mut others: Vec<usize> = (0..n).filter(|&j| j != i).collect();
             let near = |j: usize| squared(places[i], places[j]);
             others.sort_by(|&a, &b| near(a).total_cmp(&near(b)));
             others.truncate(NEAREST);
             others.extend((i + 1 < n).then_some(i + 1));
             let hop = |j: usize| (j, looked(pose, clip, [places[i], places[j]]).cost);
-            others.into_iter().map(hop).collect()
+            Ok(others.into_iter().map(hop).collect())
         });
-        let found: Vec<Vec<(usize, f64)>> = found.collect();
+        let found = found.collect::<Result<Vec<Vec<(usize, f64)>>>>()?;
         let mut hops = found.clone();
         for (i, from_here) in found.iter().enumerate() {
             from_here
                 .iter()
                 .for_each(|&(j, cost)| hops[j].push((i, cost)));
         }
-        Passages { places, hops }
+        Ok(Passages { places, hops })
     }
 
     /// The cheapest way from one frame to another, both from 0: straight over, or by frames between.
@@ -215,7 +225,7 @@ mod tests {
         let clip = Clip::of(&loom);
         let motion = Motion::new(&loom, &clip, &task);
         for (from, to) in [(19.0, 2.0), (4.0, 9.0), (2.0, 12.0), (7.0, 7.0)] {
-            let way = motion.passage(from, to);
+            let way = motion.passage(from, to).unwrap();
             let ends = [from, to].map(|t| loom.time().at(t).unwrap());
             let (first, last) = (way.points[0], way.points[way.points.len() - 1]);
             for k in 0..2 {
@@ -240,7 +250,7 @@ mod tests {
         let motion = Motion::new(&loom, &clip, &task);
         let mut detours = 0;
         for (from, to) in [(12.0, 3.0), (30.0, 21.0), (8.0, 18.0), (50.0, 5.0)] {
-            let way = motion.passage(from, to);
+            let way = motion.passage(from, to).unwrap();
             let ends = [from, to].map(|t| loom.time().at(t).unwrap());
             let straight: Vec<Point> = (0..=LOOKS).map(|i| between(ends, i)).collect();
             let (out, over) = (

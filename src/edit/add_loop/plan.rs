@@ -228,7 +228,7 @@ impl Plan {
             // The first and last control points of the bridge hold what was there.
             let inner = (self.lead() + 2, self.spans.len().saturating_sub(3));
             if inner.1 > 0 {
-                let points = motion.passage(self.to, self.from).points;
+                let points = motion.passage(self.to, self.from)?.points;
                 starts.push(way.laid(&exact, inner, &points));
                 starts.push(way.laid(&exact, inner, &[points[0], points[points.len() - 1]]));
             }

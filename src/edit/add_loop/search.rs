@@ -90,7 +90,7 @@ impl Search<'_> {
         (mut last, wide): (usize, [usize; 2]),
         longest: usize,
     ) -> Result<Attempt> {
-        let least = if best.shows() { self.least(ends) } else { 0 };
+        let least = if best.shows() { self.least(ends)? } else { 0 };
         let (mut shown, mut idle) = (best.shown(), 0);
         // Where more time and more again show no less, what is left is not the bridge's.
         while best.shows() && idle < IDLE {
@@ -113,14 +113,14 @@ impl Search<'_> {
     }
 
     /// Frames that the way over the map from end to end takes at least in steps that do not show.
-    fn least(&self, (from, to): (f64, f64)) -> usize {
+    fn least(&self, (from, to): (f64, f64)) -> Result<usize> {
         let step = SHOWS * self.motion.clip.step();
-        let length = self.motion.passage(to, from).length;
-        if step > 0.0 {
+        let length = self.motion.passage(to, from)?.length;
+        Ok(if step > 0.0 {
             (length / step) as usize
         } else {
             0
-        }
+        })
     }
 
     /// A pass with so many frames over the seam, and spans more on either side that may change.
