@@ -75,7 +75,7 @@ impl Clip {
     /// How many frames before `from` and after `to`, at most `most`, the motion first moves and turns no more
     /// than it does on the whole; where it does nowhere, where it does least.
     pub(super) fn calm(&self, (from, to): (f64, f64), most: usize) -> (usize, usize) {
-        let (a, b) = (from.round() as usize - 1, to.round() as usize - 1);
+        let (a, b) = (from.floor() as usize - 1, to.ceil() as usize - 1);
         let [steps, _, bends] = self.states.differences();
         // What a frame and those beside it do.
         let stir = |i: usize| {
@@ -216,6 +216,7 @@ mod tests {
         );
         // never beyond the motion, nor further than allowed
         assert_eq!(clip.calm((1.0, 64.0), 12), (0, 0));
+        assert_eq!(clip.calm((1.75, 63.25), 12), (0, 0));
         let (before, after) = clip.calm((22.0, 23.0), 1);
         assert!(before <= 1 && after <= 1);
     }

@@ -146,14 +146,18 @@ pub fn add_loop(
         None if times > 0 => search.run((from, to))?,
         _ => search.bridged((from, to), wanted)?,
     };
+    let own = best.plan.beyond((from, to));
+    let bridged = own.0 + best.plan.bridge + own.1;
+    super::check_frames(
+        (length as usize)
+            .saturating_add(bridged)
+            .saturating_mul(times),
+    )?;
     let looped = match times {
         1 => best.looped,
         times => best.plan.repeat(&forward.loom, times, &best.eased)?,
     };
-    let (own, kept) = (
-        best.plan.beyond((from, to)),
-        best.plan.kept(forward.loom.time()),
-    );
+    let kept = best.plan.kept(forward.loom.time());
     let mirror = |t: f64| loom.frames() as f64 + 1.0 - t;
     let counted = |frame: usize| loom.frames() + 1 - frame;
     Ok(Looped {
@@ -163,7 +167,7 @@ pub fn add_loop(
             false => (from, to),
         },
         moved,
-        bridge: own.0 + best.plan.bridge + own.1,
+        bridge: bridged,
         own: match forward.reversed {
             true => (own.1, own.0),
             false => own,
@@ -308,6 +312,17 @@ mod tests {
         let looped = add_loop(&rushing(), 22.0, 50.0, 1, Some(9), &Task::default()).unwrap();
         assert_eq!((looped.bridge, looped.own), (9, (0, 0)));
         assert!(looped.seam.worst() > SHOWS);
+    }
+
+    #[test]
+    fn ends_between_frames_are_moved_by_whole_frames() {
+        let loom = rushing();
+        for (from, to) in [(1.5, 23.5), (22.25, 63.25), (21.75, 50.75)] {
+            let looped = add_loop(&loom, from, to, 1, None, &Task::default()).unwrap();
+            let grown = looped.loom.frames() - loom.frames();
+            assert_eq!(grown, (to - from) as usize + looped.bridge, "{from}..{to}");
+            assert_eq!(looped.stretch, (from, to));
+        }
     }
 
     #[test]
