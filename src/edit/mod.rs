@@ -5,7 +5,6 @@
 
 mod add_loop;
 mod add_pose;
-mod bridge;
 mod exaggerate;
 mod extend;
 mod find_loop;

@@ -20,6 +20,7 @@
 //! the motion later and come back to it earlier, where it is calm: an animal that is to be thrown again is
 //! led to the hand that throws it, not into its flight.
 
+mod bridge;
 mod cut;
 mod passage;
 mod plan;

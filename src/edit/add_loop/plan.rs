@@ -1,7 +1,7 @@
 //! The longer curve of a loop and its frames: which parts are repeated, and what goes over a seam.
 
 use crate::diag::{Diagnostic, Result};
-use crate::edit::bridge::Way;
+
 use crate::edit::forward::assembled;
 use crate::loom::Loom;
 use crate::math::b_spline::{Curve, Place, Point};
@@ -9,6 +9,7 @@ use crate::math::curve_join::{join, join_exactly};
 use crate::math::monotone;
 use crate::signal::time::TimeSignal;
 
+use super::bridge::Way;
 use super::cut::Cut;
 use super::passage::Motion;
 use super::root;

@@ -3,9 +3,9 @@
 
 use rayon::prelude::*;
 
-use super::poses::{Poses, STRANGE};
-use super::seam::{Clip, SHOWS};
 use crate::diag::Result;
+use crate::edit::poses::{Poses, STRANGE};
+use crate::edit::seam::{Clip, SHOWS};
 use crate::math::b_spline::{Curve, Place, Point, basis};
 use crate::math::banded_cholesky::BandedSymmetric;
 use crate::signal::pose::PoseSignal;
