@@ -42,16 +42,17 @@ pub fn extend(loom: &Loom, frames: usize, task: &Task) -> Result<Warned<Loom>> {
         return super::hold(loom, last, frames).map(Warned::clean);
     }
     let output = onward(loom, frames)?;
-    let warnings = strange(loom, &output)?.into_iter().collect();
+    let warnings = strange(loom, &output, task)?.into_iter().collect();
     Ok(Warned { output, warnings })
 }
 
 /// What is to be told where the motion goes on through shapes that look strange: the map ends with its curve.
-fn strange(before: &Loom, after: &Loom) -> Result<Option<Diagnostic>> {
+fn strange(before: &Loom, after: &Loom, task: &Task) -> Result<Option<Diagnostic>> {
     let n = before.frames();
     let known = (1..=n).map(|frame| before.coordinates_at(frame as f64));
     let poses = Poses::of(&known.collect::<Result<Vec<_>>>()?);
     for frame in n + 1..=after.frames() {
+        task.check()?;
         let out = poses.strangeness(&after.coordinates_at(frame as f64)?);
         if out > STRANGE {
             let message =

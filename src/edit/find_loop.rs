@@ -10,7 +10,8 @@ use crate::task::Task;
 const TRIED: usize = 12;
 
 /// The loop of `shortest` to `longest` whole frames whose seam shows least, added once: of those whose ends
-/// are most alike in shape and in speed (rigid motion apart) the one with the smallest worst ratio.
+/// are most alike in shape and in speed (rigid motion apart) the one with the smallest worst ratio, or the
+/// least strange shapes ([`Looped::shown`]).
 ///
 /// # Errors
 /// No loop is that short or that long; those of [`add_loop`], `task` cancelled among them.
@@ -18,7 +19,7 @@ pub fn find_loop(loom: &Loom, shortest: usize, longest: usize, task: &Task) -> R
     let mut best: Option<Looped> = None;
     for (from, to) in alike(loom, shortest.max(1), longest)? {
         let looped = add_loop(loom, from as f64, to as f64, 1, None, task)?;
-        let better = |best: &Looped| looped.seam.worst() < best.seam.worst();
+        let better = |best: &Looped| looped.shown() < best.shown();
         if best.as_ref().is_none_or(better) {
             best = Some(looped);
         }

@@ -67,7 +67,7 @@ pub enum Edit {
         to: f64,
         /// How many passes more.
         times: usize,
-        /// Frames between the passes; none: as many as the distance takes.
+        /// Frames between the passes; none: as many as it takes.
         bridge: Option<usize>,
     },
     /// See [`extend`].

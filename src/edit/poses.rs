@@ -11,7 +11,8 @@ pub(super) struct Poses {
     weights: Vec<f64>,
 }
 
-/// Modes that move less than this part of the variance of the first are seen as if they moved so much.
+/// Each mode's variance is taken to be larger by this part of the largest: modes that hardly move are not
+/// seen.
 const UNSEEN: f64 = 1e-6;
 
 impl Poses {

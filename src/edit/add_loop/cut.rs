@@ -36,6 +36,19 @@ impl Cut {
         self.inserted.iter().fold(former, moved)
     }
 
+    /// The place; at the knot of the cut as the beginning of the span after it: one that rests there may have
+    /// been the end of the span before, which is of another part of the curve.
+    pub(super) fn place_after(&self, former: Place) -> Place {
+        let place = self.place(former);
+        if place.span + 1 == self.span && place.offset == self.curve.span_length(place.span) {
+            return Place {
+                span: self.span,
+                offset: 0.0,
+            };
+        }
+        place
+    }
+
     /// The place; at the knot of the cut as the end of the span before it, since what follows there is
     /// another part of the curve.
     pub(super) fn place_before(&self, former: Place) -> Place {
@@ -74,8 +87,12 @@ mod tests {
         }
         assert_eq!(cut.place(at), place(6, 0.0));
         assert_eq!(cut.place_before(at), place(5, 0.5));
+        assert_eq!(cut.place_after(at), place(6, 0.0));
         // where a knot is already
         let cut = Cut::new(&curve, place(3, 2.0), &[]);
         assert_eq!((cut.curve.spans(), cut.span), (6, 4));
+        // the end of the span before is where the next one begins
+        assert_eq!(cut.place_after(place(3, 2.0)), place(4, 0.0));
+        assert_eq!(cut.place_after(place(3, 1.5)), place(3, 1.5));
     }
 }

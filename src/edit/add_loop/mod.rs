@@ -37,6 +37,9 @@ use crate::task::Task;
 use passage::Motion;
 use search::Search;
 
+/// Times that are meant to be whole miss whole numbers by less.
+const ROUNDING: f64 = 1e-9;
+
 /// A loom with a loop more, and what was done.
 #[derive(Clone)]
 pub struct Looped {
@@ -53,18 +56,43 @@ pub struct Looped {
     /// Frames (from 1) of the motion as it was: before a seam all up to the first of these keep their bits,
     /// after it all from the second on; what is nearer to it turns into the bridge.
     pub kept: (usize, usize),
-    /// How much the first seam shows.
+    /// How much the seam of one pass more shows.
     pub seam: Seam,
-    /// How far from the mean shape the bridge goes at its frames, for 1 of the motion's farthest frame; each
-    /// mode is measured by its own deviation. Above 1.75 shapes begin to look strange.
+    /// How far from the mean shape the bridge and what turns into it go at their frames, for 1 of the motion's
+    /// farthest frame; each mode is measured by its own deviation. Above 1.75 shapes begin to look strange.
     pub strangeness: f64,
+}
+
+impl Looped {
+    /// No pass more.
+    fn none(loom: &Loom, stretch: (f64, f64), moved: f64) -> Self {
+        Looped {
+            loom: loom.clone(),
+            stretch,
+            moved,
+            bridge: 0,
+            own: (0, 0),
+            kept: (loom.frames(), 1),
+            seam: Seam::default(),
+            strangeness: 0.0,
+        }
+    }
+
+    /// How much the seam shows, or how strange the shapes about it are, on one scale: above 1.5 it shows.
+    pub fn shown(&self) -> f64 {
+        shown(&self.seam, self.strangeness)
+    }
+}
+
+/// How much a seam shows, or how strange the shapes about it are, on the scale of its ratios.
+fn shown(seam: &Seam, strangeness: f64) -> f64 {
+    seam.worst().max(SHOWS * strangeness / STRANGE)
 }
 
 impl From<Looped> for Warned<Loom> {
     fn from(looped: Looped) -> Self {
         let mut all = Warned::clean(looped.loom);
-        // Times that people compute miss whole numbers by rounding.
-        if looped.moved.abs() > 1e-9 {
+        if looped.moved.abs() > ROUNDING {
             let (from, to) = looped.stretch;
             let message = format!("the loop goes from {from} to {to}: it takes whole frames");
             all.warnings.push(Diagnostic::warning(message));
@@ -108,8 +136,8 @@ impl From<Looped> for Warned<Loom> {
 /// The loom that passes `times` times more through \[`from`, `to`\]. `to` is moved so that the loop takes
 /// whole frames. `bridge` frames go between two passes; none given: as many as the distance between the
 /// ends takes at the speed there (none where they meet), and a quarter to a half more again and again until
-/// the seam does not show and its shapes are not strange, at most two and a half times the loop (or 125),
-/// and not where more shows no less. If it shows then, ever more spans beside it turn into the bridge; if
+/// the seam does not show and its shapes are not strange, at least what known shapes on the way take, at most
+/// two and a half times the loop (or 125), and not where more shows no less. If it shows then, ever more spans beside it turn into the bridge; if
 /// that does not help, the bridge begins and ends with frames of the motion's own, up to a third of the
 /// longest on either side. Other frames keep their bits; with root motion every pass adds the loop's
 /// increment.
@@ -128,45 +156,47 @@ pub fn add_loop(
     super::check_stretch(loom, from, to)?;
     let forward = forward(loom)?;
     let (from, to) = forward.stretch(from, to);
+    // Times that people compute miss frames by rounding.
+    let whole = (from - from.round()).abs() < ROUNDING;
+    let from = if whole { from.round() } else { from };
     let length = (to - from).round().max(1.0);
     let moved = from + length - to;
     let to = from + length;
     super::check_time(loom, to)?;
-    let wanted = bridge.unwrap_or_else(|| bridge_for(forward.loom.time(), from, to));
-    super::check_frames(
-        (length as usize)
-            .saturating_add(wanted)
-            .saturating_mul(times),
-    )?;
+    let mirror = |t: f64| loom.frames() as f64 + 1.0 - t;
+    let stretch = match forward.reversed {
+        true => (mirror(to), mirror(from)),
+        false => (from, to),
+    };
+    if times == 0 {
+        return Ok(Looped::none(loom, stretch, moved));
+    }
+    let grows = |bridge: usize| {
+        let pass = (length as usize).saturating_add(bridge);
+        super::check_frames(pass.saturating_mul(times))
+    };
+    grows(bridge.unwrap_or(0))?;
     let clip = Clip::of(&forward.loom);
     let search = Search {
         motion: Motion::new(&forward.loom, &clip, task),
         times,
     };
     let best = match bridge {
-        None if times > 0 => search.run((from, to))?,
-        _ => search.bridged((from, to), wanted)?,
+        None => search.run((from, to))?,
+        Some(bridge) => search.bridged((from, to), bridge)?,
     };
     let own = best.plan.beyond((from, to));
     let bridged = own.0 + best.plan.bridge + own.1;
-    super::check_frames(
-        (length as usize)
-            .saturating_add(bridged)
-            .saturating_mul(times),
-    )?;
+    grows(bridged)?;
     let looped = match times {
         1 => best.looped,
         times => best.plan.repeat(&forward.loom, times, &best.eased)?,
     };
     let kept = best.plan.kept(forward.loom.time());
-    let mirror = |t: f64| loom.frames() as f64 + 1.0 - t;
     let counted = |frame: usize| loom.frames() + 1 - frame;
     Ok(Looped {
         loom: forward.restore(&looped)?,
-        stretch: match forward.reversed {
-            true => (mirror(to), mirror(from)),
-            false => (from, to),
-        },
+        stretch,
         moved,
         bridge: bridged,
         own: match forward.reversed {
@@ -178,11 +208,7 @@ pub fn add_loop(
             false => kept,
         },
         strangeness: best.strangeness,
-        seam: if times == 0 {
-            Seam::default()
-        } else {
-            best.seam
-        },
+        seam: best.seam,
     })
 }
 
@@ -233,11 +259,11 @@ mod tests {
                 // two spans are at most three frames and a half here
                 if frame < to - 4.0 {
                     assert_eq!(looped.loom.at(frame).unwrap(), before, "{frame}");
-                    assert!(frame <= looped.kept.0 as f64);
+                    assert!(frame > to - 7.0 || frame <= looped.kept.0 as f64);
                 }
                 if frame > from + 4.0 {
                     assert_eq!(looped.loom.at(frame + shift).unwrap(), before, "{frame}");
-                    assert!(frame >= looped.kept.1 as f64);
+                    assert!(frame < from + 7.0 || frame >= looped.kept.1 as f64);
                 }
             }
             assert_eq!(looped.loom.pose(), loom.pose());
@@ -306,6 +332,76 @@ mod tests {
         let told = Warned::from(looped).warnings;
         let place = format!("comes back to it at {}", 22 - back);
         assert!(told[0].message.contains(&place), "{told:?}");
+    }
+
+    #[test]
+    fn a_reversed_bridge_is_told_where_it_is() {
+        let reversed = reverse(&rushing()).unwrap();
+        let looped = add_loop(&reversed, 15.0, 43.0, 1, None, &Task::default()).unwrap();
+        let straight = add_loop(&rushing(), 22.0, 50.0, 1, None, &Task::default()).unwrap();
+        assert_eq!(looped.own, (straight.own.1, straight.own.0));
+        assert_eq!(looped.kept, (65 - straight.kept.1, 65 - straight.kept.0));
+        let grown = looped.loom.frames() - 64;
+        assert_eq!(grown, 28 + looped.bridge);
+        for frame in 1..=looped.kept.0 {
+            let t = frame as f64;
+            assert_eq!(looped.loom.at(t).unwrap(), reversed.at(t).unwrap());
+        }
+        for frame in looped.kept.1..=64 {
+            let there = (frame + grown) as f64;
+            let t = frame as f64;
+            assert_eq!(looped.loom.at(there).unwrap(), reversed.at(t).unwrap());
+        }
+    }
+
+    #[test]
+    fn frames_kept_keep_their_bits_where_the_ends_lie_on_knots() {
+        // knots at every second frame, and the spans there are cut
+        let slow = retime(&ring(10, 45, true), &[[1.0, 1.0], [89.0, 45.0]]).unwrap();
+        for (from, to, times, bridge) in [
+            (21.0, 61.0, 1, Some(0)),
+            (21.0, 61.0, 2, Some(3)),
+            (20.0, 62.0, 1, None),
+        ] {
+            let looped = add_loop(&slow, from, to, times, bridge, &Task::default()).unwrap();
+            let x = |loom: &Loom, frame: usize| loom.coordinates_at(frame as f64).unwrap();
+            let grown = looped.loom.frames() - 89;
+            assert!(looped.kept.0 > 40 && looped.kept.1 < 40);
+            for frame in 1..=looped.kept.0 {
+                assert_eq!(x(&looped.loom, frame), x(&slow, frame), "{frame}");
+            }
+            for frame in looped.kept.1..=89 {
+                assert_eq!(x(&looped.loom, frame + grown), x(&slow, frame), "{frame}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_rest_at_an_end_stays_a_rest() {
+        let once = add_loop(
+            &ring(10, 45, true),
+            12.0,
+            31.0,
+            1,
+            Some(0),
+            &Task::default(),
+        );
+        let resting = crate::edit::hold(&once.unwrap().loom, 31.0, 5).unwrap();
+        for (from, to) in [(31.0, 50.0), (33.0, 50.0), (36.0, 50.0), (20.0, 33.0)] {
+            let looped = add_loop(&resting, from, to, 1, Some(0), &Task::default()).unwrap();
+            let n = looped.loom.frames();
+            let grown = n - resting.frames();
+            assert_eq!(grown, (to - from) as usize);
+            for frame in looped.kept.1..=resting.frames() {
+                let there = (frame + grown) as f64;
+                let t = frame as f64;
+                assert_eq!(
+                    looped.loom.at(there).unwrap(),
+                    resting.at(t).unwrap(),
+                    "{frame}"
+                );
+            }
+        }
     }
 
     #[test]
@@ -411,8 +507,12 @@ mod tests {
         }
         assert!(add_loop(&loom, 3.0, 9.0, usize::MAX, None, &Task::default()).is_err());
         assert!(add_loop(&loom, 3.0, 9.0, 1, Some(usize::MAX), &Task::default()).is_err());
-        let none = add_loop(&loom, 3.0, 9.0, 0, None, &Task::default()).unwrap();
-        assert_eq!(none.loom.time(), loom.time());
+        for bridge in [None, Some(usize::MAX)] {
+            let none = add_loop(&loom, 3.0, 9.0, 0, bridge, &Task::default()).unwrap();
+            assert_eq!(none.loom.time(), loom.time());
+            assert_eq!((none.bridge, none.kept), (0, (20, 1)));
+            assert_eq!(Warned::from(none).warnings, []);
+        }
     }
 
     #[test]

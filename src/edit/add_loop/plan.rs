@@ -26,8 +26,8 @@ pub(super) struct Plan {
     spans: Vec<f64>,
     /// For each frame of the bridge its place in these spans, and rho's slope.
     steps: Vec<(Place, f64)>,
-    /// Knots put into the last span before the seam and into the first after it, so that there is a control
-    /// point a frame: a seam is turned into within a frame or two.
+    /// Knots put into the last span before the seam and into the first after it, and into those more that may
+    /// change, so that there is a control point a frame: a seam is turned into within a frame or two.
     before: Vec<Place>,
     after: Vec<Place>,
     /// How many spans more may change before the seam and after it: those asked for, and one where a knot
@@ -35,6 +35,8 @@ pub(super) struct Plan {
     more: [usize; 2],
     /// Those asked for.
     wide: [usize; 2],
+    /// The span that ends with the loop, and the one that begins with it.
+    ends: [usize; 2],
 }
 
 /// Spans that one span beside a seam is cut into, at most.
@@ -75,6 +77,7 @@ impl Plan {
             0 => Default::default(),
             frames => paced(frames, rates, (lead, rest)),
         };
+        let (a, b) = inside(curve, (a, b));
         let (before, after) = pieces(curve, (a, b), rates, wide);
         let within =
             |place: Place| 0.0 < place.offset && place.offset < curve.span_length(place.span);
@@ -90,6 +93,7 @@ impl Plan {
             after,
             more,
             wide,
+            ends: [b.span, a.span],
         })
     }
 
@@ -101,11 +105,10 @@ impl Plan {
 
     /// The frames (from 1) up to the first of which, and from the second on, all keep their bits.
     pub(super) fn kept(&self, time: &TimeSignal) -> (usize, usize) {
-        // Two spans beside a seam change, and of those next to them the bits.
-        let (a, b) = (self.from, self.to);
-        let span = |t: f64| time.place_at(t).map_or(0, |(place, _)| place.span);
-        let before = |place: &&Place| place.span + 2 + self.wide[0] < span(b);
-        let upto = |place: &&Place| place.span <= span(a) + 2 + self.wide[1];
+        // Beside the spans with knots of their own two more change, by rounding at least.
+        let [b, a] = self.ends;
+        let before = |place: &&Place| place.span + 2 + self.wide[0] < b;
+        let upto = |place: &&Place| place.span <= a + 2 + self.wide[1];
         let count = |some: &dyn Fn(&&Place) -> bool| time.places().iter().take_while(some).count();
         (count(&before), count(&upto) + 1)
     }
@@ -279,12 +282,12 @@ impl Plan {
                 ..place
             };
             if pass < times {
-                let inside = |i: usize| middle.place_before(start.place(place(i)));
+                let inside = |i: usize| middle.place_before(start.place_after(place(i)));
                 frames.extend((first..last).map(|i| kept(i, pass, moved(inside(i)))));
                 shift += middle.span - start.span;
             } else {
                 let rest = first..time.places().len();
-                frames.extend(rest.map(|i| kept(i, pass, moved(start.place(place(i))))));
+                frames.extend(rest.map(|i| kept(i, pass, moved(start.place_after(place(i))))));
             }
         }
         frames
@@ -363,14 +366,8 @@ pub(super) fn room(time: &TimeSignal, (from, to): (f64, f64), times: usize) -> [
     most.map(|spans| spans.saturating_sub(2))
 }
 
-/// Knots in the span that ends at b and in the one that begins at a, and in `wide` spans beyond, so that each
-/// piece takes about a frame at these rates; none where the ends are in one span.
-fn pieces(
-    curve: &Curve,
-    (a, b): (Place, Place),
-    rates: [f64; 2],
-    wide: [usize; 2],
-) -> (Vec<Place>, Vec<Place>) {
+/// The same places, where they are knots: a as the beginning of a span, b as the end of one.
+fn inside(curve: &Curve, (a, b): (Place, Place)) -> (Place, Place) {
     let length = |span: usize| curve.span_length(span);
     let b = match b.span.checked_sub(1) {
         Some(span) if b.offset == 0.0 => Place {
@@ -386,6 +383,18 @@ fn pieces(
         },
         false => a,
     };
+    (a, b)
+}
+
+/// Knots in the span that ends at b and in the one that begins at a, and in `wide` spans beyond, so that each
+/// piece takes about a frame at these rates; none where the ends are in one span.
+fn pieces(
+    curve: &Curve,
+    (a, b): (Place, Place),
+    rates: [f64; 2],
+    wide: [usize; 2],
+) -> (Vec<Place>, Vec<Place>) {
+    let length = |span: usize| curve.span_length(span);
     if a.span >= b.span {
         return (Vec::new(), Vec::new());
     }

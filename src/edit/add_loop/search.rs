@@ -1,11 +1,10 @@
 //! Which bridge: the first that does not show, of those that take more and more time, change more of the
 //! motion beside the seam, or begin and end where the motion is calmer.
 
-use super::bridge_for;
 use super::passage::Motion;
 use super::plan::{Plan, room};
+use super::{bridge_for, shown};
 use crate::diag::Result;
-use crate::edit::poses::STRANGE;
 use crate::edit::seam::{SHOWS, Seam};
 use crate::loom::Loom;
 use crate::math::b_spline::Point;
@@ -28,7 +27,7 @@ pub(super) struct Attempt {
     pub(super) eased: Vec<Point>,
     pub(super) looped: Loom,
     pub(super) seam: Seam,
-    /// How far out the farthest shape of the bridge is, for 1 of the motion's own.
+    /// How far out the farthest shape of the bridge and of what turns into it is, for 1 of the motion's own.
     pub(super) strangeness: f64,
 }
 
@@ -46,12 +45,12 @@ impl Search<'_> {
         }
         let ends = (from - before as f64, to + after as f64);
         let calmer = self.between(ends, longest)?;
-        let better = calmer.shown() < asked.shown();
-        Ok(if better { calmer } else { asked })
+        // The ends are not moved for little.
+        let helps = !calmer.shows() || calmer.shown() < HELPS * asked.shown();
+        Ok(if helps { calmer } else { asked })
     }
 
-    /// The same with so many frames over the seam, of which nothing more than two spans on either side
-    /// change.
+    /// The loop with so many frames over the seam, and no more than two spans on either side that turn.
     pub(super) fn bridged(&self, ends: (f64, f64), bridge: usize) -> Result<Attempt> {
         self.attempt(ends, (bridge, [0; 2]), None)
     }
@@ -64,7 +63,7 @@ impl Search<'_> {
         let mut best = self.bridged(ends, wanted)?;
         let (mut last, mut wide) = (wanted, [0; 2]);
         for doubled in 1.. {
-            best = self.longer(ends, best, (last, wide), longest)?;
+            best = self.lengthened(ends, best, (last, wide), longest)?;
             let wider = room.map(|room| room.min(1 << doubled));
             if !best.shows() || wider == wide {
                 break;
@@ -83,7 +82,7 @@ impl Search<'_> {
     }
 
     /// The best after `best` with ever more frames over the seam, the last of which were `last`.
-    fn longer(
+    fn lengthened(
         &self,
         ends: (f64, f64),
         mut best: Attempt,
@@ -94,19 +93,19 @@ impl Search<'_> {
         let (mut shown, mut idle) = (best.shown(), 0);
         // Where more time and more again show no less, what is left is not the bridge's.
         while best.shows() && idle < IDLE {
-            let next = longer(last, shown).max(least).min(longest);
+            let next = next_length(last, shown).max(least).min(longest);
             if next <= last {
                 break;
             }
-            let longer = self.attempt(ends, (next, wide), Some(&best))?;
-            (last, shown) = (next, longer.shown());
+            let attempt = self.attempt(ends, (next, wide), Some(&best))?;
+            (last, shown) = (next, attempt.shown());
             idle = if shown < HELPS * best.shown() {
                 0
             } else {
                 idle + 1
             };
             if shown < best.shown() {
-                best = longer;
+                best = attempt;
             }
         }
         Ok(best)
@@ -136,12 +135,17 @@ impl Search<'_> {
         let looped = plan.repeat(self.motion.loom, 1, &eased)?;
         let last = to.floor() as usize;
         let again = (last + bridge + 1, from.floor() as usize + 1);
+        // What turns into the bridge counts too.
+        let kept = plan.kept(self.motion.loom.time());
+        let turned = kept.0 + 1..again.0 + kept.1.saturating_sub(again.1);
+        let mut strangeness = 0.0_f64;
+        for frame in turned {
+            let x = looped.coordinates_at(frame as f64)?;
+            strangeness = strangeness.max(self.motion.clip.poses().strangeness(&x));
+        }
         Ok(Attempt {
             seam: Seam::measure(self.motion.clip, &looped, last, again),
-            strangeness: (last + 1..again.0)
-                .filter_map(|frame| looped.coordinates_at(frame as f64).ok())
-                .map(|x| self.motion.clip.poses().strangeness(&x))
-                .fold(0.0, f64::max),
+            strangeness,
             plan,
             eased,
             looped,
@@ -156,12 +160,12 @@ impl Attempt {
 
     /// How much the seam shows, or how strange the shapes are that lead over it, on one scale.
     fn shown(&self) -> f64 {
-        self.seam.worst().max(SHOWS * self.strangeness / STRANGE)
+        shown(&self.seam, self.strangeness)
     }
 }
 
 /// Frames of the bridge to try after one that shows so much: accelerations fall as the square of the time.
-fn longer(frames: usize, shown: f64) -> usize {
+fn next_length(frames: usize, shown: f64) -> usize {
     let factor = (shown / SHOWS).sqrt().clamp(1.25, 1.5);
     ((factor * frames as f64).ceil() as usize).max(frames + 1)
 }
