@@ -320,18 +320,29 @@ fn looped_without_a_seam(name: &str, loom: &Loom, (from, to): (usize, usize)) {
     );
     only_the_seam_changes(name, loom, &looped, (from, to));
     let (a, b) = (span(loom, from as f64), span(loom, to as f64));
+    let shift = looped.loom.frames() - loom.frames();
     for frame in 1..=loom.frames() {
         let own = span(loom, frame as f64);
+        if own + 2 < b {
+            same_bits(name, loom, &looped.loom, frame, 0);
+        }
+        if own > a + 2 {
+            let same = shape(loom, frame) == shape(&looped.loom, frame + shift);
+            assert!(same, "{name}: frame {frame} by {shift}");
+        }
         assert!(own + 3 >= b || frame <= looped.kept.0, "{name}: {frame}");
         assert!(own <= a + 3 || frame >= looped.kept.1, "{name}: {frame}");
     }
 }
 
+/// What a frame looks like where what travels arrives elsewhere.
+fn shape(loom: &Loom, frame: usize) -> Vec<f64> {
+    loom.coordinates_at(frame as f64).expect("within")
+}
+
 fn only_the_seam_changes(name: &str, loom: &Loom, looped: &Looped, (from, to): (usize, usize)) {
     let shift = looped.loom.frames() - loom.frames();
     assert_eq!(shift, to - from + looped.bridge);
-    // what travels arrives elsewhere, in the same shape
-    let shape = |loom: &Loom, frame: usize| loom.coordinates_at(frame as f64).expect("within");
     for frame in 1..=looped.kept.0 {
         same_bits(name, loom, &looped.loom, frame, 0);
     }

@@ -59,13 +59,12 @@ pub fn smooth(loom: &Loom, from: f64, to: f64, amount: f64) -> Result<Loom> {
 
 /// Control points of `inside` a part of the way from one curve to the other.
 fn blend(a: &Curve, b: &Curve, amount: f64, inside: std::ops::Range<usize>) -> Curve {
-    let mut curve = a.clone();
-    for j in inside {
+    let first = inside.start;
+    let blended = inside.map(|j| {
         let (from, to) = (a.controls()[j], b.controls()[j]);
-        let at = [0, 1].map(|axis| from[axis] + amount * (to[axis] - from[axis]));
-        curve = curve.with_control(j, at);
-    }
-    curve
+        [0, 1].map(|axis| from[axis] + amount * (to[axis] - from[axis]))
+    });
+    a.with_controls(first, blended)
 }
 
 #[cfg(test)]

@@ -194,8 +194,19 @@ impl Curve {
     /// There is no such control point.
     #[must_use]
     pub fn with_control(&self, index: usize, to: Point) -> Self {
+        self.with_controls(index, [to])
+    }
+
+    /// The same curve with the control points from number `first` on at `to`, one after the other.
+    ///
+    /// # Panics
+    /// There are not so many control points.
+    #[must_use]
+    pub fn with_controls(&self, first: usize, to: impl IntoIterator<Item = Point>) -> Self {
         let mut curve = self.clone();
-        curve.controls[index] = to;
+        for (i, to) in to.into_iter().enumerate() {
+            curve.controls[first + i] = to;
+        }
         curve
     }
 

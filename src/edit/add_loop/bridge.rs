@@ -199,14 +199,14 @@ impl<'a> Way<'a> {
         way: &[Point],
     ) -> Curve {
         let parts = (way.len().max(2) - 1) as f64;
-        (0..count).fold(curve.clone(), |curve, j| {
+        let to = (0..count).map(|j| {
             let along = parts * (j + 1) as f64 / (count + 1) as f64;
             let (piece, part) = (along.floor() as usize, along.fract());
             let at = |i: usize| way.get(i).or(way.last()).copied().unwrap_or_default();
             let (a, b) = (at(piece), at(piece + 1));
-            let to = [0, 1].map(|k| a[k] + part * (b[k] - a[k]));
-            curve.with_control(self.first + from + j, to)
-        })
+            [0, 1].map(|k| a[k] + part * (b[k] - a[k]))
+        });
+        curve.with_controls(self.first + from, to)
     }
 
     /// Newton's method on the sum of a power of what shows, the curvature of the shapes left out, damped
@@ -224,12 +224,10 @@ impl<'a> Way<'a> {
             let Some(step) = self.step(&best, (power, top), damping) else {
                 break;
             };
-            let curve = (0..self.count).fold(best.curve.clone(), |curve, j| {
-                let at = curve.controls()[self.first + j];
-                let to = [at[0] + step[2 * j], at[1] + step[2 * j + 1]];
-                curve.with_control(self.first + j, to)
-            });
-            let next = State::new(self, curve);
+            let free = &best.curve.controls()[self.first..][..self.count];
+            let moved = free.iter().zip(step.chunks_exact(2));
+            let moved = moved.map(|(at, by)| [at[0] + by[0], at[1] + by[1]]);
+            let next = State::new(self, best.curve.with_controls(self.first, moved));
             let after = next.energy(power, top);
             if after < before {
                 let gained = before - after;

@@ -137,10 +137,10 @@ impl From<Looped> for Warned<Loom> {
 /// whole frames. `bridge` frames go between two passes; none given: as many as the distance between the
 /// ends takes at the speed there (none where they meet), and a quarter to a half more again and again until
 /// the seam does not show and its shapes are not strange, at least what known shapes on the way take, at most
-/// two and a half times the loop (or 125), and not where more shows no less. If it shows then, ever more spans beside it turn into the bridge; if
-/// that does not help, the bridge begins and ends with frames of the motion's own, up to a third of the
-/// longest on either side. Other frames keep their bits; with root motion every pass adds the loop's
-/// increment.
+/// two and a half times the loop (or 125), and not where more shows no less. If it shows then, ever more
+/// spans beside it turn into the bridge; if that does not help, the bridge begins and ends with frames of the
+/// motion's own, up to a third of the longest on either side. Other frames keep their bits; with root motion
+/// every pass adds the loop's increment.
 ///
 /// # Errors
 /// The loop leaves \[1, n\], has no length or less than a frame; too many frames; time that runs back and

@@ -79,22 +79,27 @@ impl Passages {
     fn new(pose: &PoseSignal, clip: &Clip, places: Vec<Point>, task: &Task) -> Result<Self> {
         let n = places.len();
         let squared = |a: Point, b: Point| (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2);
-        let found = (0..n).into_par_iter().map(|i| {
-            task.check()?;
+        let pairs = (0..n).into_par_iter().flat_map_iter(|i| {
             let mut others: Vec<usize> = (0..n).filter(|&j| j != i).collect();
             let near = |j: usize| squared(places[i], places[j]);
             others.sort_by(|&a, &b| near(a).total_cmp(&near(b)));
             others.truncate(NEAREST);
             others.extend((i + 1 < n).then_some(i + 1));
-            let hop = |j: usize| (j, looked(pose, clip, [places[i], places[j]]).cost);
-            Ok(others.into_iter().map(hop).collect())
+            others.into_iter().map(move |j| (i.min(j), i.max(j)))
         });
-        let found = found.collect::<Result<Vec<Vec<(usize, f64)>>>>()?;
-        let mut hops = found.clone();
-        for (i, from_here) in found.iter().enumerate() {
-            from_here
-                .iter()
-                .for_each(|&(j, cost)| hops[j].push((i, cost)));
+        // The way back costs the same.
+        let mut pairs: Vec<(usize, usize)> = pairs.collect();
+        pairs.sort_unstable();
+        pairs.dedup();
+        let costs = pairs.par_iter().map(|&(i, j)| {
+            task.check()?;
+            Ok(looked(pose, clip, [places[i], places[j]]).cost)
+        });
+        let costs = costs.collect::<Result<Vec<f64>>>()?;
+        let mut hops = vec![Vec::new(); n];
+        for (&(i, j), cost) in pairs.iter().zip(costs) {
+            hops[i].push((j, cost));
+            hops[j].push((i, cost));
         }
         Ok(Passages { places, hops })
     }

@@ -1,7 +1,6 @@
 //! The longer curve of a loop and its frames: which parts are repeated, and what goes over a seam.
 
 use crate::diag::{Diagnostic, Result};
-
 use crate::edit::forward::assembled;
 use crate::loom::Loom;
 use crate::math::b_spline::{Curve, Place, Point};
@@ -30,11 +29,10 @@ pub(super) struct Plan {
     /// change, so that there is a control point a frame: a seam is turned into within a frame or two.
     before: Vec<Place>,
     after: Vec<Place>,
-    /// How many spans more may change before the seam and after it: those asked for, and one where a knot
-    /// was put, which changes it by rounding anyway.
-    more: [usize; 2],
-    /// Those asked for.
+    /// How many spans more may change before the seam and after it, ..
     wide: [usize; 2],
+    /// .. and one where a knot was put, which changes it by rounding anyway.
+    rounded: [usize; 2],
     /// The span that ends with the loop, and the one that begins with it.
     ends: [usize; 2],
 }
@@ -82,7 +80,6 @@ impl Plan {
         let within =
             |place: Place| 0.0 < place.offset && place.offset < curve.span_length(place.span);
         let rounded = [b, a].map(|end| usize::from(within(end) && b.span > a.span + 1));
-        let more = [0, 1].map(|side| wide[side] + rounded[side]);
         Ok(Plan {
             from,
             to,
@@ -91,8 +88,8 @@ impl Plan {
             steps,
             before,
             after,
-            more,
             wide,
+            rounded,
             ends: [b.span, a.span],
         })
     }
@@ -127,12 +124,12 @@ impl Plan {
     /// How many free control points there are before those of the bridge: they act on the spans that may
     /// change and on none before.
     fn lead(&self) -> usize {
-        self.before.len() + self.more[0]
+        self.before.len() + self.wide[0] + self.rounded[0]
     }
 
     /// How many there are after those of the bridge.
     fn trail(&self) -> usize {
-        self.after.len() + self.more[1]
+        self.after.len() + self.wide[1] + self.rounded[1]
     }
 
     /// The number of the first free control point of a curve joined after `left`.
@@ -145,20 +142,14 @@ impl Plan {
         self.lead() + self.spans.len() + 1 + self.trail()
     }
 
-    /// The loom with `times` passes more, control points `eased` over each seam.
+    /// The loom with `times` >= 1 passes more, control points `eased` over each seam.
     pub(super) fn repeat(&self, loom: &Loom, times: usize, eased: &[Point]) -> Result<Loom> {
-        if times == 0 {
-            return Ok(loom.clone());
-        }
         let time = loom.time();
         let [end, middle, start] = self.cuts(time);
         let frames = self.frames(time, times, (&end, &middle, &start));
         let pass = |left: &Cut, right: &Curve| {
             let joined = join((&left.curve, left.span), (right, start.span), &self.spans)?;
-            let set = |curve: Curve, (j, at): (usize, &Point)| {
-                curve.with_control(self.first(left) + j, *at)
-            };
-            Some(eased.iter().enumerate().fold(joined, set))
+            Some(joined.with_controls(self.first(left), eased.iter().copied()))
         };
         let mut curve = start.curve.clone();
         for _ in 1..times {
@@ -239,9 +230,7 @@ impl Plan {
             if let Some((plan, known)) = known {
                 let from = free + self.lead() - plan.lead();
                 if plan.bridge == self.bridge {
-                    let set =
-                        |curve: Curve, (j, at): (usize, &Point)| curve.with_control(from + j, *at);
-                    starts.push(known.iter().enumerate().fold(starts[0].clone(), set));
+                    starts.push(starts[0].with_controls(from, known.iter().copied()));
                 } else if let Some(known) = plan.inner_of(known) {
                     starts.push(way.laid(&exact, inner, known));
                 }
